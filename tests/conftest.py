@@ -135,7 +135,7 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
         "upd.runner.write_figures": lambda *_: [],
         "upd.plot.matplotlib.write_sheets": lambda *_, **__: [],
         "upd.batch.sweeps.write_report": lambda folder: folder / "report.html",
-        "upd.report.sweep_page.write_study_report": lambda folder, *_: folder / "report.html",
+        "upd.report.page.page_text": lambda *_, **__: "",
     }.items():
         monkeypatch.setattr(name, written)
 

@@ -65,8 +65,7 @@ def sentence(words: str, end: str = ".") -> str:
 
 def counted(count: int, what: str) -> str:
     """1 point, 2 points, 3 meshes."""
-    plural = "es" if what.endswith("sh") else "s"
-    return f"{count} {what}{plural if count != 1 else ''}"
+    return f"{count} {what}{'' if count == 1 else 'es' if what.endswith('sh') else 's'}"
 
 
 def listed(items: Iterable[str], most: int | None, form: str = "{}") -> str:
@@ -112,6 +111,5 @@ def _shown_field(value: Any) -> str:
     if not shape or 0 in shape or not hasattr(value, "ravel"):
         return str(shape or value)
     flat = abs(value.ravel()) if value.dtype.kind == "c" else value.ravel()
-    return (
-        f"{shape} {flat.min():.4g} to {flat.max():.4g}" if flat.dtype.kind in "fiu" else f"{shape}"
-    )
+    ranges = f" {flat.min():.4g} to {flat.max():.4g}" if flat.dtype.kind in "fiu" else ""
+    return f"{shape}{ranges}"

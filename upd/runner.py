@@ -21,9 +21,8 @@ from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_l
 from upd.labels import check_words
 from upd.progress import Listener, Stages, forget_peak, silent
 from upd.report import write_report
-from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file, sealed
-from upd.report.notebook import RunResult
+from upd.report.notebook import RunResult, write_curves, write_figures
 from upd.results import Check, Estimates, Result, write_netcdf
 from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
 from upd.results.netcdf import DIGEST, file_digest
@@ -83,8 +82,7 @@ def run(
         return _solved(plan, stages, None)
     own, handler = _begin(Path(out), numbered, loaded)
     if own.replaces:
-        for seconds in (None, 0.0):
-            progress("folder", f"replaces the earlier run in {own.place}", seconds)
+        progress("folder", f"replaces the earlier run in {own.place}", 0.0)
     log.info(packages)
     # matplotlib takes a while to import: meanwhile the solver computes.
     threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
@@ -159,21 +157,17 @@ def _solved(plan: Plan[Any], stages: Stages, own: OwnFolder | None) -> RunResult
     result, fault = _collected(solution.plan, solution, "", checks, None, stages), ""
     if own is not None:
         result, fault = _leave(own, result, plan, solution, stages)
-    if fault:
-        log.error(fault)
-        disk = UpdError(fault)
-        disk.result = result
-        raise disk
-    if result.outcome == FAILED:
-        log.error(result.status)
-        inputs = failed and all(c.name in analysis.input_checks for c in failed)
+    if result.outcome != FAILED:
+        return result
+    log.error(result.status)
+    kind: type[UpdError] = UpdError if fault else ConvergenceError
+    text = fault or result.status.removeprefix("failed: ")
+    if failed and not fault:
+        kind = InputError if all(c.name in analysis.input_checks for c in failed) else kind
         text = "\n".join(["self-check failed", *(c.sentence for c in failed)])
-        failure = (InputError if inputs else ConvergenceError)(
-            text if failed else result.status.removeprefix("failed: ")
-        )
-        failure.result = result
-        raise failure
-    return result
+    failure = kind(text)
+    failure.result = result
+    raise failure
 
 
 def _collected(
@@ -277,10 +271,9 @@ def _reached(one: Result) -> Result:
 
 
 def _write_summary(result: RunResult, folder: Path) -> None:
-    data, arrays = result.summary(), folder / "result.nc"
-    if arrays.is_file():
-        data = {**data, DIGEST: file_digest(arrays)}
-    write_text(folder / "summary.json", sealed(data))
+    arrays = folder / "result.nc"
+    digest = {DIGEST: file_digest(arrays)} if arrays.is_file() else {}
+    write_text(folder / "summary.json", sealed(result.summary() | digest))
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:

@@ -213,7 +213,7 @@ def draw_sample(scene: AnyScene, count: int, seed: int) -> Sample:
             f"{MOST_POINTS}; some tens tell a band to a tenth"
         )
     if seed < 0:
-        problems.append(f"--seed {seed}: give 0 or a larger whole number")
+        problems.append(f"seed {seed}: give 0 or a larger whole number")
     if problems:
         raise InputError("\n".join(problems))
     drawn = qmc.LatinHypercube(len(inputs), rng=np.random.default_rng(seed)).random(count)
@@ -392,7 +392,7 @@ def _drawn(
     """The sample that is asked for; None for a grid."""
     if count is None:
         if seed is not None:
-            raise InputError(f"--seed {seed}: is for --sample; give its number of points too")
+            raise InputError(f"seed {seed}: is for a sample; give its number of points too")
         return None
     if vary:
         raise InputError(

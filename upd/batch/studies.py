@@ -87,12 +87,14 @@ class Study:
         charts = work_precision_charts(curves)
         # slow to import: only where a page is made
         from upd.plot.matplotlib import write_sheets
-        from upd.report.sweep_page import write_study_report
+        from upd.report.page import Section, page_text, write_page
 
-        figures = write_sheets(charts, folder)
         failed = sum(bool(one.outcome.failure) for one in solved)
-        page = write_study_report(folder, self.title, failed, report.notes, tables, charts)
-        return [table, data, *figures, page]
+        how = ("warning", f"Done, {failed} failed") if failed else ("passed", "Done")
+        sections = [Section("Answer", tables), Section("Figures", charts=charts)]
+        html = page_text(self.title, sections, verdict=(*how, " ".join(report.notes)))
+        page = write_page(folder / "report.html", html)
+        return [table, data, *write_sheets(charts, folder), page]
 
 
 @dataclass(frozen=True, repr=False)

@@ -33,8 +33,8 @@ from upd.plot.sweep_charts import (
     sweep_charts,
 )
 from upd.report import write_report
-from upd.report.files import as_csv
 from upd.report.folder import sealed
+from upd.report.notebook import as_csv
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -177,9 +177,6 @@ def run_sweep(
     begin = time.perf_counter()
     store = PointStore(folder, "sweep")
 
-    def check(outcome: Outcome) -> None:
-        check_follow(outcome, follow)
-
     with store.sole():
         store.sole_grid(
             {
@@ -191,10 +188,10 @@ def run_sweep(
         )
         solved = next((outcome for outcome in plan.kept.values() if not outcome.failure), None)
         if solved is not None:
-            check(solved)
+            check_follow(solved, follow)
         known = plan.kept | plan.refused
         batch = Batch(plan.tasks, plan.workers, known, plan.label, plan.groups, plan.seconds)
-        found = run_points(batch, store, check=check, watch=watch)
+        found = run_points(batch, store, check=lambda one: check_follow(one, follow), watch=watch)
         followed = follow or analysis_of(plan.scene).headline_names
         columns = tuple(make_columns(found, followed))
         sampled = () if plan.sample is None else _sampled(plan.sample, columns)

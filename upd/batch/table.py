@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from upd.batch.plan import Place
 from upd.errors import InputError
 from upd.plot.sweep_charts import Column, Parameter
-from upd.report.files import as_csv
+from upd.report.notebook import as_csv
 from upd.results import Case, Result, shared_label
 from upd.vary.outcome import Outcome
 

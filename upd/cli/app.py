@@ -15,7 +15,7 @@ from cyclopts import App, Parameter
 from upd import __version__
 from upd.cache.folders import numbered
 from upd.cli import terminal
-from upd.cli.terminal import Live, Notes, SetOption, warn
+from upd.cli.terminal import SetOption, run_progress, warn
 from upd.errors import InputError, UpdError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
@@ -95,8 +95,8 @@ def run(
     from upd.runner import run as run_scene
 
     loaded = _loaded(scene, set)
-    with Live(stages=full) as live:
-        try:
+    try:
+        with run_progress(stages=full) as live:
             result = run_scene(
                 loaded,
                 out=out or Path("runs") / loaded.name,
@@ -104,16 +104,15 @@ def run(
                 report=report,
                 progress=live,
             )
-        except UpdError as error:
-            if error.folder is not None and error.result is None:
-                terminal.errors.print(f"The log and what converged are in {error.folder}")
-            if error.folder is None or error.result is None:
-                raise
-            live.stop()
-            print_result(terminal.console, error.result, full=full)
-            if report and not (error.folder / "report.html").exists():
-                terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
+    except UpdError as error:
+        if error.folder is not None and error.result is None:
+            terminal.errors.print(f"The log and what converged are in {error.folder}")
+        if error.folder is None or error.result is None:
             raise
+        print_result(terminal.console, error.result, full=full)
+        if report and not (error.folder / "report.html").exists():
+            terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
+        raise
     # faults of pictures are printed once, beside the answer
     print_result(terminal.console, replace(result, faults=()), full=full)
     for fault in result.faults:
@@ -180,7 +179,7 @@ def mesh(
     free = next(folder for folder in numbered(place) if not folder.exists())
     files = mesh_files(output or [], free, request)
     drawn = None if no_picture else picture or files[0].with_suffix(".png")
-    with Live() as live:
+    with run_progress() as live:
         regenerate(terminal.console, request, files, drawn, live, split=split)
 
 
@@ -230,7 +229,7 @@ def study(
 
     loaded = scene_at(_loaded(scene, set), at)
     load = "" if at is None else f"-at-{file_name(at)}"
-    with Live() as live:
+    with run_progress() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
         workers = study_workers(loaded, planned, **asdict(who))
@@ -247,8 +246,7 @@ def sweep(
     scene: str,
     *,
     vary: list[str] | None = None,
-    sample: int | None = None,
-    seed: int | None = None,
+    sample: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
     who: WhoSolves = _ANYBODY,
     set: SetOption = None,
     out: Path | None = None,
@@ -268,9 +266,8 @@ def sweep(
         path=first:last:count[:log] or path=value,value,...; repeat for a grid.
     sample
         Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
-        of --vary: a check of the bands by the inputs, which runs give to first order.
-    seed
-        Of the draw; without, that of the sample in the folder, else 0.
+        of --vary: a check of the bands by the inputs, which runs give to first order. After it the
+        seed of the draw, --sample 64 3; without, that of the sample in the folder, else 0.
     out
         Sweep folder; by default runs/sweep-NAME, or runs/sample-NAME.
     follow
@@ -284,13 +281,14 @@ def sweep(
     from upd.cli.batch import print_sweep, print_sweep_plan
 
     loaded = _loaded(scene, set)
-    kind = "sweep" if sample is None else "sample"
+    count, seed, *_ = [*(sample or []), None, None]
+    kind = "sweep" if count is None else "sample"
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
-    with Live() as live:
+    with run_progress() as live:
         live("planning", "what the points share", None)
-        planned = plan_sweep(loaded, vary or (), folder, sample=sample, seed=seed, **asdict(who))
+        planned = plan_sweep(loaded, vary or (), folder, sample=count, seed=seed, **asdict(who))
     print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK
@@ -347,7 +345,7 @@ def design(
     if minimise is None:
         found = design_damper(loaded)
     else:
-        with Live() as live:
+        with run_progress() as live:
             found = design_damper(
                 loaded, minimise=minimise, over=over or [], for_=for_ or [], progress=live
             )
@@ -394,7 +392,7 @@ def fit(
     """
     from upd.fitting import fit as fit_inputs
 
-    with Live() as live:
+    with run_progress() as live:
         loaded = _loaded(scene, set)
         folder = out or Path("runs") / f"fit-{loaded.name}"
         found = fit_inputs(loaded, to, vary, starts=starts, out=folder, progress=live)
@@ -519,14 +517,19 @@ def command_table() -> list[tuple[str, str]]:
     return rows
 
 
+def _shown(record: logging.LogRecord) -> bool:
+    """What a user should see before anything else, on stderr too: warnings of recipes."""
+    if record.levelno >= logging.WARNING:
+        warn(record.getMessage())
+    return True
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
     # figures are files: the environment of a notebook may name a backend that is not here
     os.environ["MPLBACKEND"] = "agg"
     logging.getLogger("upd").addHandler(logging.NullHandler())
-    recipes = logging.getLogger("upd.mesh.recipe_modules")
-    if not recipes.handlers:
-        recipes.addHandler(Notes(logging.WARNING))
+    logging.getLogger("upd.mesh.recipe_modules").addFilter(_shown)
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
     except UpdError as error:

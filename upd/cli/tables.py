@@ -33,9 +33,9 @@ def print_table(console: Console, table: AnswerTable, *, cut: bool = False) -> N
 
 
 def _print_lines(console: Console, lines: Iterable[AnswerLine]) -> None:
-    for line in lines:
+    for text, mood in lines:
         # a path longer than the terminal is wide stays one line, to be copied
-        console.print(Text(line.text, style=_STYLES.get(line.mood, "")), soft_wrap=True)
+        console.print(Text(text, style=_STYLES.get(mood, "")), soft_wrap=True)
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import logging
 import os
 import sys
 import time
@@ -17,6 +16,7 @@ from rich.console import Console
 from rich.text import Text
 
 from upd.errors import InputError
+from upd.progress import Listener
 from upd.report.columns import text_width
 
 if TYPE_CHECKING:
@@ -78,47 +78,29 @@ def check_ending(path: Path | None, option: str, *endings: str) -> None:
         raise InputError(f"{option} {path}: the ending {path.suffix!r} is not known; use {known}")
 
 
-class Notes(logging.Handler):
-    """Warnings that a user should see before anything else, on stderr."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        warn(record.getMessage())
-
-
-class Live:
+@contextmanager
+def run_progress(*, stages: bool = True) -> Iterator[Listener]:
     """Progress on the terminal: the running stage with a clock, and a line per finished stage
     unless ``stages`` is false.
 
     Plain lines when the output is no terminal.
     """
+    begin, status = time.perf_counter(), console.status("")
 
-    def __init__(self, *, stages: bool = True) -> None:
-        self._stages = stages
-        self._status: Any = None
-        self._begin = time.perf_counter()
-
-    def __enter__(self) -> Live:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def stop(self) -> None:
-        """End the running line."""
-        if self._status is not None:
-            self._status.stop()
-            self._status = None
-
-    def __call__(self, stage: str, detail: str, seconds: float | None) -> None:
-        self.stop()
-        if seconds is None:
-            if console.is_terminal:
-                self._status = console.status(Text(f"{stage}: {detail}"))
-                self._status.start()
-        elif self._stages or stage == "folder":
-            elapsed = time.perf_counter() - self._begin
+    def show(stage: str, detail: str, seconds: float | None) -> None:
+        status.stop()
+        if seconds is None and console.is_terminal:
+            status.update(Text(f"{stage}: {detail}"))
+            status.start()
+        elif seconds is not None and (stages or stage == "folder"):
+            elapsed = time.perf_counter() - begin
             line = f" {seconds:7.2f} s  {stage}: {detail}"
             console.print(Text.assemble((f"{elapsed:7.1f} s", "dim"), line))
+
+    try:
+        yield show
+    finally:
+        status.stop()
 
 
 @contextmanager

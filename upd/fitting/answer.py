@@ -15,7 +15,7 @@ from upd.errors import InputError
 from upd.fitting.residuals import SHOWN, CurveNoise, FurtherMeasurement, Knowledge, Start, is_bent
 from upd.fitting.targets import CurveTarget, FitTarget, VariedInput, fitted_scene
 from upd.plot.chart import Axis, Band, Chart, Trace
-from upd.report.answer_folder import FigureAnswer
+from upd.report.answer import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene import ForcedScene
 

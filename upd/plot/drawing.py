@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
@@ -14,6 +13,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
+from matplotlib.text import Text
 
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.section import CutBody, Length, Opening, SectionView, cut
@@ -85,7 +85,7 @@ def _draw(
             (low, high), wide = _turns(mark), 2.0 * _RADIUS * scale
             arc = Arc(mark.vertex, wide, wide, theta1=low, theta2=high, color=_INK, linewidth=0.7)
             ax.add_patch(arc)
-        _write(ax, _label(mark, scale))
+        ax.add_artist(_label(mark, scale))
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.set_title(view.title, fontsize=10)
@@ -104,7 +104,7 @@ def _frame(
     scale = 0.0
     for _ in range(_ROUNDS):
         scale = max(scale, float(max((high[0] - low[0]) / wide, (high[1] - low[1]) / tall)))
-        marks = [_label(mark, scale).box(scale) for mark in view.marks]
+        marks = [_box(_label(mark, scale), scale) for mark in view.marks]
         lines = [np.array(_line(mark)) for mark in view.marks if isinstance(mark, Length)]
         every = np.vstack([*points, *marks, *lines])
         low, high = every.min(axis=0) - _ROOM * scale, every.max(axis=0) + _ROOM * scale
@@ -112,76 +112,66 @@ def _frame(
     return scale
 
 
-@dataclass(frozen=True)
-class _Label:
+def _text(
+    text: str, at: FloatArray, side: Literal["left", "center", "right"], turn: float, above: bool
+) -> Text:
     """The name of a dimension with its value.
 
-    ``at`` is the end of its line of letters that ``side`` names, ``turn`` its angle in degrees.
+    Parameters
+    ----------
+    at
+        (2,) the end of its line of letters that ``side`` names.
+    turn
+        Its angle in degrees.
     """
-
-    text: str
-    at: FloatArray
-    side: Literal["left", "center", "right"]
-    turn: float
-    above: bool
-
-    def box(self, scale: float) -> FloatArray:
-        """Corners, (4, 2) in mm."""
-        long, tall = len(self.text) * _LETTER * scale, 1.5 * _LETTERS / 72.0 * scale
-        begin = {"left": 0.0, "center": -0.5, "right": -1.0}[self.side] * long
-        low = 0.0 if self.above else -0.5 * tall
-        flat = np.array([(x, y) for x in (begin, begin + long) for y in (low, low + tall)])
-        turn = math.radians(self.turn)
-        across = np.array([math.cos(turn), math.sin(turn)])
-        up = np.array([-across[1], across[0]])
-        corners: FloatArray = self.at + flat[:, :1] * across + flat[:, 1:] * up
-        return corners
+    about: dict[str, Any] = {"rotation": turn, "rotation_mode": "anchor", "fontsize": _LETTERS}
+    level: Literal["bottom", "center"] = "bottom" if above else "center"
+    return Text(float(at[0]), float(at[1]), text, color=_INK, ha=side, va=level, **about)
 
 
-def _label(mark: Length | Opening, scale: float) -> _Label:
+def _box(label: Text, scale: float) -> FloatArray:
+    """Corners of a text, (4, 2) in mm."""
+    long, tall = len(label.get_text()) * _LETTER * scale, 1.5 * _LETTERS / 72.0 * scale
+    begin = {"left": 0.0, "center": -0.5, "right": -1.0}[label.get_horizontalalignment()] * long
+    low = 0.0 if label.get_verticalalignment() == "bottom" else -0.5 * tall
+    flat = np.array([(x, y) for x in (begin, begin + long) for y in (low, low + tall)])
+    turn = math.radians(label.get_rotation())
+    across = np.array([math.cos(turn), math.sin(turn)])
+    up = np.array([-across[1], across[0]])
+    corners: FloatArray = label.get_position() + flat[:, :1] * across + flat[:, 1:] * up
+    return corners
+
+
+def _label(mark: Length | Opening, scale: float) -> Text:
     if isinstance(mark, Opening):
         return _label_of_angle(mark, scale)
     one, two, direction, turn, turned = _written(mark)
     text = f"{mark.name} {mark.value:.4g}"
     if len(text) * _LETTER * scale < 0.96 * float(np.linalg.norm(two - one)):
-        return _Label(text, (one + two) / 2.0, "center", turn, True)
+        return _text(text, (one + two) / 2.0, "center", turn, True)
     if abs(abs(turn) - 90.0) < 1.0:
         # beside an upright length, away from what it measures
         out = -1.0 if mark.offset * mark.along[1] > 0.0 else 1.0
         at = (one + two) / 2.0 + np.array([0.08 * scale * out, 0.0])
-        return _Label(text, at, "left" if out > 0.0 else "right", 0.0, False)
+        return _text(text, at, "left" if out > 0.0 else "right", 0.0, False)
     # beyond the arrows, which stand outside a short length
     short = float(np.linalg.norm(two - one)) <= 3.0 * _REACH * scale
     reach = (1.15 * _REACH if short else 0.06) * scale * direction
     at_two = (mark.beyond == "end") != turned
     at = two + reach if at_two else one - reach
-    return _Label(text, at, "left" if at_two else "right", turn, False)
+    return _text(text, at, "left" if at_two else "right", turn, False)
 
 
-def _label_of_angle(mark: Opening, scale: float) -> _Label:
+def _label_of_angle(mark: Opening, scale: float) -> Text:
     text = f"{mark.name} {mark.value:.4g}°"
     vertex, radius = np.array(mark.vertex), _RADIUS * scale
     if mark.label_at is not None:
         place = np.array(mark.label_at)
         side: Literal["left", "right"] = "left" if place[0] > 0.0 else "right"
-        return _Label(text, vertex + scale * place, side, 0.0, False)
+        return _text(text, vertex + scale * place, side, 0.0, False)
     middle = math.radians(sum(_turns(mark)) / 2.0)
     at = vertex + 1.15 * radius * np.array([math.cos(middle), math.sin(middle)])
-    return _Label(text, at, "left" if math.cos(middle) > 0.0 else "right", 0.0, False)
-
-
-def _write(ax: Axes, label: _Label) -> None:
-    ax.text(
-        float(label.at[0]),
-        float(label.at[1]),
-        label.text,
-        rotation=label.turn,
-        rotation_mode="anchor",
-        ha=label.side,
-        va="bottom" if label.above else "center",
-        fontsize=_LETTERS,
-        color=_INK,
-    )
+    return _text(text, at, "left" if math.cos(middle) > 0.0 else "right", 0.0, False)
 
 
 def _line(mark: Length) -> tuple[FloatArray, FloatArray]:

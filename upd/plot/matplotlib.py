@@ -23,24 +23,8 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarForm
 from matplotlib.transforms import ScaledTranslation
 
 from upd.cache.files import whole_file
+from upd.plot import style
 from upd.plot.chart import MOST_PANELS, Area, Axis, Band, Chart, Map, Trace
-from upd.plot.style import (
-    area_colour,
-    band_colour,
-    colour_of,
-    colour_range,
-    coordinates,
-    is_log,
-    is_wide,
-    labelled,
-    legend_names,
-    marker_area,
-    plain,
-    proportion,
-    sides,
-    state_colours,
-    with_room,
-)
 
 Drawing = Callable[[Axes], Any]
 
@@ -92,7 +76,7 @@ _BESIDE, _ABOVE = 1.05, 2.0
 
 def draw(chart: Chart, ax: Axes) -> Axes:
     """Draw a chart on matplotlib axes; returns them."""
-    chart = with_room(chart)
+    chart = style.with_room(chart)
     _grid(chart, ax)
     _draw_maps(chart, ax)
     for area in chart.areas:
@@ -105,7 +89,7 @@ def draw(chart: Chart, ax: Axes) -> Axes:
     _axis(chart, chart.x, "x", ax)
     _axis(chart, chart.y, "y", ax)
     for mark in chart.marks:
-        ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour_of(mark), zorder=4)
+        ax.plot(mark.x, mark.y, "o", ms=3.5, color=style.colour_of(mark), zorder=4)
     if chart.equal:
         ax.set_aspect("equal")
     _draw_legend(chart, ax)
@@ -159,9 +143,11 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
     first = charts[0]
     wide, tall = first.size
-    if all(is_wide(chart) for chart in charts):
+    if all(style.is_wide(chart) for chart in charts):
         # Wide maps leave no empty place above each other.
-        tall = min(tall, max(proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE)
+        tall = min(
+            tall, max(style.proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE
+        )
     drawings = [partial(draw, chart) for chart in charts[:MOST_PANELS]]
     return draw_sheet(drawings, first.columns, (wide, tall), dpi)
 
@@ -176,9 +162,9 @@ def _grid(chart: Chart, ax: Axes) -> None:
 def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     """Scale, ticks and ends of one axis."""
     which = ax.xaxis if name == "x" else ax.yaxis
-    values = coordinates(chart, name)
+    values = style.coordinates(chart, name)
     limits = getattr(ax, f"set_{name}lim")
-    if is_log(axis, values):
+    if style.is_log(axis, values):
         getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
         seen = values[values > 0.0]
         few = seen.max() < _FEW_DECADES * seen.min()
@@ -193,7 +179,7 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
         ax.margins(x=0.0)
     if axis.ticks:
         which.set_ticks(
-            [at for at, _ in axis.ticks], labels=[plain(text) for _, text in axis.ticks]
+            [at for at, _ in axis.ticks], labels=[style.plain(text) for _, text in axis.ticks]
         )
     if axis.low is not None or axis.high is not None:
         # matplotlib would take the free end from the view of this moment: let it be that of all
@@ -216,13 +202,13 @@ def _titles(chart: Chart, ax: Axes) -> None:
     own_lines = case and across < len(whole) and max(len(title), len(case)) <= across
     text = f"{title}\n{case}" if own_lines else whole
     # Its height given, matplotlib does not look for one: that costs a quarter of all drawing.
-    ax.set_title(plain(text) if own_lines else _lines(text, across), fontsize=_LETTERS, y=1.0)
+    ax.set_title(style.plain(text) if own_lines else _lines(text, across), fontsize=_LETTERS, y=1.0)
 
 
 def _lines(text: str, letters: int) -> str:
     """A text on at most two lines of so many letters; what does not fit is cut."""
     lines = textwrap.wrap(text, max(letters, 12), max_lines=2, placeholder=" …")
-    return plain("\n".join(lines))
+    return style.plain("\n".join(lines))
 
 
 _STYLE: dict[str, dict[str, Any]] = {
@@ -252,9 +238,9 @@ def _draw_trace(t: Trace, ax: Axes) -> None:
     ax.plot(
         t.x,
         t.y,
-        color=colour_of(t),
+        color=style.colour_of(t),
         lw=lw,
-        label=plain(t.entry or t.label) or None,
+        label=style.plain(t.entry or t.label) or None,
         zorder=zorder,
         **_STYLE[t.style],
     )
@@ -263,38 +249,41 @@ def _draw_trace(t: Trace, ax: Axes) -> None:
 def _draw_band(band: Band, ax: Axes) -> None:
     """What lies between two values of one axis, or a line at one."""
     line, span = (ax.axvline, ax.axvspan) if band.axis == "x" else (ax.axhline, ax.axhspan)
-    style: dict[str, Any] = {"color": band_colour(band), "label": plain(band.label) or None}
+    look: dict[str, Any] = {
+        "color": style.band_colour(band),
+        "label": style.plain(band.label) or None,
+    }
     if band.dashed:
         for k, at in enumerate(dict.fromkeys((band.low, band.high))):
-            line(at, ls="--", lw=1.0, zorder=1.5, **style | ({"label": None} if k else {}))
+            line(at, ls="--", lw=1.0, zorder=1.5, **look | ({"label": None} if k else {}))
     elif band.low == band.high:
         # Wide and pale: a measured value is no curve.
-        line(band.low, lw=4.0, alpha=0.3, zorder=0.5, **style)
+        line(band.low, lw=4.0, alpha=0.3, zorder=0.5, **look)
     else:
-        span(band.low, band.high, alpha=0.2, lw=0.0, zorder=0.5, **style)
+        span(band.low, band.high, alpha=0.2, lw=0.0, zorder=0.5, **look)
 
 
 def _draw_area(area: Area, ax: Axes) -> None:
     """What lies between two curves; states are opaque, for they are stacked."""
-    style: dict[str, Any] = (
+    look: dict[str, Any] = (
         {"alpha": 1.0, "zorder": 1.0} if area.state else {"alpha": 0.22, "zorder": 0.8}
     )
     ax.fill_between(
         area.x,
         area.low,
         area.high,
-        color=area_colour(area),
+        color=style.area_colour(area),
         lw=0.0,
-        label=plain(area.label) or None,
-        **style,
+        label=style.plain(area.label) or None,
+        **look,
     )
 
 
 def _draw_scatters(chart: Chart, ax: Axes) -> None:
     """Coloured points with the colour bar they share."""
-    low, high = colour_range(chart.scatters)
+    low, high = style.colour_range(chart.scatters)
     for k, s in enumerate(chart.scatters):
-        area = 0.7 * marker_area(s.size)
+        area = 0.7 * style.marker_area(s.size)
         drawn = ax.scatter(
             s.x,
             s.y,
@@ -315,36 +304,36 @@ def _draw_scatters(chart: Chart, ax: Axes) -> None:
 
 def _draw_maps(chart: Chart, ax: Axes) -> None:
     """Maps with the colour bar they share."""
-    low, high = colour_range(chart.maps)
+    low, high = style.colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
         drawn = _cells(m, low, high, ax)
         # Axes for a colour bar cost as much as the map: states of a compact map stand in the
         # legend. One value everywhere has no scale.
-        if k == 0 and (is_wide(chart) if m.states else low < high):
+        if k == 0 and (style.is_wide(chart) if m.states else low < high):
             bar = _bar(drawn, chart, m.value, ax)
             if m.states:
-                bar.set_ticks(list(range(len(m.states))), labels=[plain(s) for s in m.states])
+                bar.set_ticks(list(range(len(m.states))), labels=[style.plain(s) for s in m.states])
 
 
 def _cells(m: Map, low: float, high: float, ax: Axes) -> Any:
     """A cell for every value of a map."""
-    style: dict[str, Any] = {"cmap": "viridis", "vmin": low, "vmax": high}
+    look: dict[str, Any] = {"cmap": "viridis", "vmin": low, "vmax": high}
     if m.states:
         ends = {"vmin": -0.5, "vmax": len(m.states) - 0.5}
-        style = {"cmap": ListedColormap(state_colours(m))} | ends
+        look = {"cmap": ListedColormap(style.state_colours(m))} | ends
         if max(m.z.shape) <= _FEW_CELLS:
             # Between many cells the lines would take more room than the cells.
-            style |= {"edgecolors": "w", "lw": 0.2}
-    return ax.pcolormesh(m.x, m.y, np.ma.masked_invalid(m.z.T), shading="nearest", **style)
+            look |= {"edgecolors": "w", "lw": 0.2}
+    return ax.pcolormesh(m.x, m.y, np.ma.masked_invalid(m.z.T), shading="nearest", **look)
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:
     """Colour bar: beside the axes, below those of a wide drawing."""
     place: dict[str, Any] = {"shrink": 0.85}
-    if is_wide(chart):
+    if style.is_wide(chart):
         place |= {"location": "bottom", "aspect": 40.0}
     bar: Any = ax.figure.colorbar(drawn, ax=ax, **place)
-    bar.set_label(plain(axis.label) if axis.name != "state" else "")
+    bar.set_label(style.plain(axis.label) if axis.name != "state" else "")
     bar.formatter.set_useOffset(False)
     return bar
 
@@ -353,12 +342,12 @@ def _draw_legend(chart: Chart, ax: Axes) -> None:
     """Below the axes: an entry per name in the order of the names, and the states of maps."""
     drawn, labels = ax.get_legend_handles_labels()
     handles: dict[str, Any] = {
-        name: drawn[labels.index(plain(name))]
-        for name in legend_names(chart)
-        if plain(name) in labels
+        name: drawn[labels.index(style.plain(name))]
+        for name in style.legend_names(chart)
+        if style.plain(name) in labels
     }
-    for m in () if is_wide(chart) else chart.maps:
-        for state, colour in zip(m.states, state_colours(m), strict=False):
+    for m in () if style.is_wide(chart) else chart.maps:
+        for state, colour in zip(m.states, style.state_colours(m), strict=False):
             handles[state] = Patch(facecolor=colour, edgecolor="#999999", lw=0.4)
     if not handles:
         return
@@ -371,7 +360,7 @@ def _draw_legend(chart: Chart, ax: Axes) -> None:
         shown |= {f"and {more} more": Line2D([], [], ls="")} if more > 1 else handles
     ax.legend(
         list(shown.values()),
-        [plain(name) for name in shown],
+        [style.plain(name) for name in shown],
         loc="upper center",
         bbox_to_anchor=(0.5, 0.0),
         # below the axis' own words, however high the axes are
@@ -385,16 +374,18 @@ def _draw_legend(chart: Chart, ax: Axes) -> None:
 def _draw_labels(chart: Chart, ax: Axes) -> None:
     """Words above the marks that have room for them."""
     align = {"right": "left", "center": "center", "left": "right"}
-    for mark, shown, side in zip(chart.marks, labelled(chart), sides(chart), strict=True):
+    for mark, shown, side in zip(
+        chart.marks, style.labelled(chart), style.sides(chart), strict=True
+    ):
         if shown:
             ax.annotate(
-                plain(mark.text),
+                style.plain(mark.text),
                 (mark.x, mark.y),
                 (0.0, 3.0),
                 textcoords="offset points",
                 ha=align[side],
                 va="bottom",
                 fontsize=_SMALL,
-                color=colour_of(mark),
+                color=style.colour_of(mark),
                 bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.5},
             )

@@ -15,22 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.plot import style
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
-from upd.plot.style import (
-    area_colour,
-    band_colour,
-    colour_of,
-    colour_range,
-    coordinates,
-    is_log,
-    labelled,
-    legend_names,
-    marker_area,
-    proportion,
-    sides,
-    state_colours,
-    with_room,
-)
 
 _DASH = {"dashed": "dash", "dotted": "dot", "dashdot": "dashdot"}
 _MODE = {"line": "lines", "both": "lines+markers"} | dict.fromkeys(_DASH, "lines")
@@ -63,16 +49,16 @@ def figure(chart: Chart) -> dict[str, Any]:
     dict
         ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing.
     """
-    chart = with_room(chart)
-    names = {escape(name) for name in legend_names(chart)}
+    chart = style.with_room(chart)
+    names = {escape(name) for name in style.legend_names(chart)}
     data = list(_traces(chart))
     for trace in data:
         # Curves of one name, as of the contact faces of one load, have one entry.
         trace["showlegend"] = trace["name"] in names
         names.discard(trace["name"])
     layout: dict[str, Any] = {
-        "xaxis": _axis(chart, chart.x, coordinates(chart, "x")),
-        "yaxis": _axis(chart, chart.y, coordinates(chart, "y"), _LINE),
+        "xaxis": _axis(chart, chart.x, style.coordinates(chart, "x")),
+        "yaxis": _axis(chart, chart.y, style.coordinates(chart, "y"), _LINE),
         "hovermode": "closest",
         "showlegend": any(trace["showlegend"] for trace in data),
         "shapes": [shape for band in chart.bands for shape in _band(band)],
@@ -81,7 +67,7 @@ def figure(chart: Chart) -> dict[str, Any]:
         layout["yaxis"] |= {"scaleanchor": "x", "scaleratio": 1, "constrain": "domain"}
         layout["xaxis"] |= {"constrain": "domain"}
     # maps keep their own shape
-    wide = 1.0 / (chart.equal * proportion(chart) or 1.0 / _WIDE)
+    wide = 1.0 / (chart.equal * style.proportion(chart) or 1.0 / _WIDE)
     return {"data": data, "layout": layout, "wide": wide}
 
 
@@ -95,7 +81,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         "zeroline": False,
         "automargin": True,
     }
-    log = is_log(axis, values)
+    log = style.is_log(axis, values)
     if log:
         out["type"] = "log"
     if axis.ticks:
@@ -169,7 +155,7 @@ def _value(axis: Axis, place: str) -> str:
 
 
 def _hover(chart: Chart, *more: str, name: str = "") -> str:
-    """Template of the text at the pointer: both coordinates, further lines, a name."""
+    """Template of the text at the pointer: both style.coordinates, further lines, a name."""
     x = f"{_template(chart.x.name)}: %{{x}}" if chart.x.ticks else _value(chart.x, "x")
     lines = "<br>".join((x, _value(chart.y, "y"), *more))
     return f"{lines}<extra>{_template(name)}</extra>"
@@ -177,7 +163,7 @@ def _hover(chart: Chart, *more: str, name: str = "") -> str:
 
 def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
     """All of a chart, what lies below first."""
-    low, high = colour_range(chart.maps)
+    low, high = style.colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
         yield _map(chart, m, low, high) | {"showscale": k == 0 and (bool(m.states) or low < high)}
     for area in chart.areas:
@@ -192,7 +178,7 @@ def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
 
 
 def _curve(chart: Chart, t: Trace) -> dict[str, Any]:
-    colour, name = colour_of(t), escape(t.entry or t.label)
+    colour, name = style.colour_of(t), escape(t.entry or t.label)
     marker: dict[str, Any] = {"color": colour, "size": 6} | _MARKER.get(t.style, {})
     if "line" in marker:
         marker["line"] = {"color": colour, **marker["line"]}
@@ -218,8 +204,10 @@ def _marks(chart: Chart) -> Iterator[dict[str, Any]]:
     Plotly itself omits a mark without a place on its axes.
     """
     groups: dict[str, list[tuple[Mark, bool, str]]] = {}
-    for mark, shown, side in zip(chart.marks, labelled(chart), sides(chart), strict=True):
-        groups.setdefault(colour_of(mark), []).append((mark, bool(shown), side))
+    for mark, shown, side in zip(
+        chart.marks, style.labelled(chart), style.sides(chart), strict=True
+    ):
+        groups.setdefault(style.colour_of(mark), []).append((mark, bool(shown), side))
     for colour, found in groups.items():
         words = [escape(m.text).replace("\n", "<br>") for m, *_ in found]
         yield _scatter(
@@ -238,7 +226,7 @@ def _marks(chart: Chart) -> Iterator[dict[str, Any]]:
 
 def _band(b: Band) -> list[dict[str, Any]]:
     """Dashed lines at its ends, a wide pale line, or a pale span."""
-    other, colour = "y" if b.axis == "x" else "x", band_colour(b)
+    other, colour = "y" if b.axis == "x" else "x", style.band_colour(b)
     shared: dict[str, Any] = {"layer": "below", f"{b.axis}ref": b.axis, f"{other}ref": "paper"}
     shared |= {f"{other}0": 0, f"{other}1": 1}
     if b.low != b.high and not b.dashed:
@@ -254,7 +242,7 @@ def _band(b: Band) -> list[dict[str, Any]]:
 
 def _band_entry(b: Band) -> dict[str, Any]:
     """The legend entry of a band, which also makes the axis reach to it."""
-    colour = band_colour(b)
+    colour = style.band_colour(b)
     line = {"color": colour, "width": 1.2, "dash": "dash"}
     if not b.dashed:
         line = {"color": _pale(colour, 0.35), "width": 8}
@@ -269,7 +257,7 @@ def _pale(colour: str, alpha: float) -> str:
 
 def _area(chart: Chart, a: Area) -> Iterator[dict[str, Any]]:
     """The lower curve, unseen, and the upper one filled down to it, its width at the pointer."""
-    colour, name = area_colour(a), escape(a.label)
+    colour, name = style.area_colour(a), escape(a.label)
     width = _value(Axis(a.label or "width", chart.y.unit), "customdata")
     x = _hover(chart).partition("<br>")[0]
     yield _scatter(a.x, a.low, "lines", line={"width": 0}, hoverinfo="skip")
@@ -300,8 +288,8 @@ def _scale(axis: Axis, low: float, high: float) -> dict[str, Any]:
 
 def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
     """Coloured points; the first of a chart have the colour bar that all share."""
-    marker = _scale(s.axis, *colour_range(chart.scatters)) | {
-        "size": _numbers(_PIXELS * np.sqrt(0.7 * marker_area(s.size))),
+    marker = _scale(s.axis, *style.colour_range(chart.scatters)) | {
+        "size": _numbers(_PIXELS * np.sqrt(0.7 * style.marker_area(s.size))),
         "color": _numbers(s.value),
         "opacity": 1,
         "line": {"color": "#ffffff", "width": 0.5},
@@ -326,7 +314,7 @@ def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
 
 
 def _states(chart: Chart, m: Map) -> dict[str, Any]:
-    n, colours, known = len(m.states), state_colours(m), np.isfinite(m.z.T)
+    n, colours, known = len(m.states), style.state_colours(m), np.isfinite(m.z.T)
     names = np.array([escape(state) for state in m.states], object)
     steps = [[(k + end) / n, colour] for k, colour in enumerate(colours) for end in (0, 1)]
     bar = {"orientation": "h", "thickness": 12, "tickvals": list(range(n))}

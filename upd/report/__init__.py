@@ -39,6 +39,6 @@ def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
     """
     if any((Path(folder) / "sweep.json").is_file() for folder in folders):
         raise InputError("a comparison is of runs: give each sweep's folder by itself")
-    from upd.report.compare import write_comparison as write
+    from upd.report.run_page import write_comparison as write
 
     return write(folders, path)

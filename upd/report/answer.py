@@ -1,51 +1,40 @@
-"""The answer of a run in the terminal: verdict, tables, checks, cost, files and what warns; and in
-`print(result)`: the ten lines of it that matter most.
+"""Answers as text: of a run in the terminal, with verdict, tables, checks, cost, files and what
+warns; of one figure and a few tables. `print` shows the first lines.
 """
 
 from __future__ import annotations
 
+import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Self
 
 from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
+from upd.cache.files import whole_files
+from upd.cache.sources import versions
+from upd.errors import InputError, one_line
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
-from upd.plot.chart import Entry
+from upd.plot.chart import Chart, Entry
+from upd.report import tables
 from upd.report.columns import SHORT, whole_table, wrapped
-from upd.report.tables import (
-    MAIN,
-    MOST_NOTES,
-    all_numbers,
-    answer_tables,
-    budget_table,
-    checks_table,
-    effects_table,
-    error_parts,
-    inputs_exceed,
-    main_numbers,
-    number_table,
-    reached_numbers,
-    stage_table,
-    warnings,
-)
+from upd.report.page import Section, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of, worst_check
 from upd.results.quantities import number_label, quantity_of
+from upd.scene import AnyScene
+from upd.scene.keys import scene_as_run
 
 #: lines that fit on a screen
 LINES = 40
+#: characters of a line of an answer of one figure: a terminal of 80 columns shows it whole
+WIDTH = 79
 #: mood of the line above numbers
 TITLE = "title"
-
-
-class AnswerLine(NamedTuple):
-    """A line of the answer, and its mood: the outcome it reports, "title" for what stands above
-    numbers, "" otherwise.
-    """
-
-    text: str
-    mood: str = ""
+#: a line, and its mood: the outcome it reports, "title" for what stands above numbers, "" otherwise
+AnswerLine = tuple[str, str]
 
 
 def answer(
@@ -71,41 +60,28 @@ def answer(
     lines, end = _verdict(summary, width), _end(summary, width, folder, faults, full=full)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
-    tables = answer_tables(size, entries) if own or not full else []
-    room = LINES - len(lines) - len(end)
-    for k, table in enumerate(tables):
+    found = tables.answer_tables(size, entries) if own or not full else []
+    for table in found:
         block = table_lines(table, width, cut=not own)
         # the tables of an analysis are whole; of others those that fit on a screen
-        if own or k == 0 or len(block) < room:
-            lines, room = lines + block, room - len(block)
+        if own or table is found[0] or len(lines) + len(block) + len(end) < LINES:
+            lines += block
     if full:
         for table in (
-            *all_numbers(entries),
-            budget_table(main_numbers(size, entries)),
-            effects_table(summary["effects"]),
-            checks_table(summary["checks"]),
-            stage_table(summary["cost"].get("stages", {})),
+            *tables.all_numbers(entries),
+            tables.budget_table(tables.main_numbers(size, entries)),
+            tables.effects_table(summary["effects"]),
+            tables.checks_table(summary["checks"]),
+            tables.stage_table(summary["cost"].get("stages", {})),
         ):
             lines += table_lines(table, width)
     return lines + end
 
 
-def short_answer(summary: Mapping[str, Any], width: int, folder: Path | None) -> list[str]:
-    """Verdict, main numbers, checks, cost and how much warns, on at most ten lines."""
-    size, results = summary["size"], summary["results"]
-    lines = [line.text for line in _verdict(summary, width)]
-    end = [checked(summary).partition(". Left out")[0], _cost(summary, ".table()")]
-    end += [f"Run folder: {folder}"] * (folder is not None)
-    noted = warnings(summary["checks"], results)
-    if noted and outcome_of(summary["status"]) != FAILED:
-        end.append(f"Warnings: {len(noted)}, with what to do in .table()")
-    table = number_table(MAIN, reached_numbers(size, results))
-    numbers = whole_table(table, width, cut=True) if table.rows else []
-    numbers = numbers[: max(SHORT - len(lines) - len(end), 0)]
-    # a case whose numbers find no room
-    if numbers and numbers[-1] in [row[0] for row in table.rows if not any(row[1:])]:
-        numbers.pop()
-    return [*lines, *numbers, *end][:SHORT]
+def opened(text: str) -> str:
+    """What `print` shows of an answer: its first lines, and what shows all of it."""
+    lines = text.splitlines()
+    return "\n".join(lines if len(lines) <= SHORT else [*lines[: SHORT - 1], "... .table()"])
 
 
 def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
@@ -114,8 +90,8 @@ def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[An
     """
     if not table.rows:
         return []
-    lines = [AnswerLine(""), *[AnswerLine(table.heading, TITLE)] * bool(table.heading)]
-    lines += map(AnswerLine, whole_table(table, width, cut=cut))
+    lines = [("", ""), *[(table.heading, TITLE)] * bool(table.heading)]
+    lines += [(line, "") for line in whole_table(table, width, cut=cut)]
     return lines + _wrapped(table.note, width)
 
 
@@ -146,7 +122,7 @@ def _most_important(summary: Mapping[str, Any]) -> Entry | None:
     analysis = analysis_named(str(size.get("analysis", "")))
     names = analysis.verdict_names if analysis else ()
     named = (entry for name in names for entry in entries if entry["name"] == name)
-    found = (*named, *main_numbers(size, entries))
+    found = (*named, *tables.main_numbers(size, entries))
     return next((entry for entry in found if not entry.get("withheld")), None)
 
 
@@ -159,23 +135,23 @@ def _end(
     full: bool,
 ) -> list[AnswerLine]:
     """Chosen levels, sources of the main error, checks, cost and files; at last what warns."""
-    lines = [AnswerLine("")]
-    for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary, "--full")):
+    lines = [("", "")]
+    for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary)):
         lines += _wrapped(text, width)
     has_page = folder is not None and (folder / "report.html").is_file()
     if folder is not None:
-        lines.append(AnswerLine(f"Run folder: {folder}"))
-        lines += [AnswerLine(f"Report: {folder / 'report.html'}")] * has_page
+        lines.append((f"Run folder: {folder}", ""))
+        lines += [(f"Report: {folder / 'report.html'}", "")] * has_page
     if outcome_of(summary["status"]) == FAILED:
         return lines
     named = None if full else 2
-    notes = [*faults, *warnings(summary["checks"], summary["results"], named)]
-    most = len(notes) if full else MOST_NOTES
+    notes = [*faults, *tables.warnings(summary["checks"], summary["results"], named)]
+    most = len(notes) if full else tables.MOST_NOTES
     for note in notes[:most]:
         lines += _wrapped(f"Warning: {note}", width, WARNED)
     if (more := len(notes) - most) > 0:
         where = "on the page" if has_page else "printed by --full"
-        lines.append(AnswerLine(f"Warnings besides: {more}, {where}.", WARNED))
+        lines.append((f"Warnings besides: {more}, {where}.", WARNED))
     return lines
 
 
@@ -187,13 +163,14 @@ def _accuracy(summary: Mapping[str, Any]) -> str:
 
 def _budget(summary: Mapping[str, Any]) -> str:
     """The sources of the error of the first main number that has some."""
-    main = [_most_important(summary), *main_numbers(summary["size"], summary["results"])]
+    main = [_most_important(summary), *tables.main_numbers(summary["size"], summary["results"])]
     for entry in filter(None, main):
-        if entry.get("estimated_error") is not None or entry.get("input_error") is not None:
-            parts = error_parts(entry)
-            sources = ", ".join(f"{name} {percent_of(error)}" for name, error, *_ in parts)
-            more = "; its inputs move it by more: finer levels do not help" * inputs_exceed(entry)
-            return f"Error of the {number_label(entry['name'])}: {sources}{more}"
+        error, band = entry.get("estimated_error"), entry.get("input_error")
+        if error is not None or band is not None:
+            parts = (f"{name} {percent_of(part)}" for name, part, *_ in tables.error_parts(entry))
+            more = error is not None and band is not None and band > error
+            useless = "; its inputs move it by more: finer levels do not help" * more
+            return f"Error of the {number_label(entry['name'])}: {', '.join(parts)}{useless}"
     return ""
 
 
@@ -215,17 +192,157 @@ def checked(summary: Mapping[str, Any]) -> str:
     return f"{text}. Left out, worth at most {value} of {what} (limit {limit}): {', '.join(names)}"
 
 
-def _cost(summary: Mapping[str, Any], whole: str) -> str:
-    """Seconds, memory and size, and what shows the ``whole`` answer."""
+def _cost(summary: Mapping[str, Any]) -> str:
+    """Seconds, memory and size, and what shows all numbers."""
     size, cost = summary["size"], summary["cost"]
     parts = [f"{cost['total_s']:.1f} s", f"{cost['peak_rss_mb']:.0f} MB"] if cost else []
     if dofs := sum(size.get("n_dof", {}).values()):
         parts.append(f"{dofs} dofs")
     if size.get("n_pairs") is not None:
         parts.append(f"{size['n_pairs']} contact pairs")
-    return f"Cost: {', '.join(parts)}; all {len(summary['results'])} numbers: {whole}"
+    return f"Cost: {', '.join(parts)}; all {len(summary['results'])} numbers: --full"
 
 
 def _wrapped(text: str, width: int, mood: str = "") -> list[AnswerLine]:
     """A text on as many lines as it needs."""
-    return [AnswerLine(line, mood) for line in wrapped(text, width)]
+    return [(line, mood) for line in wrapped(text, width)]
+
+
+# -- answers of one figure and a few tables: their text, their page and their folder --------------
+
+
+@dataclass(frozen=True, repr=False)
+class FigureAnswer(ABC):
+    """A verdict, a few tables and notes, and one figure.
+
+    Attributes
+    ----------
+    source : AnyScene
+        The scene that the question was about.
+    folder : Path, optional
+        Where its files lie; None when nothing was written.
+    """
+
+    source: AnyScene
+    folder: Path | None = field(default=None, kw_only=True)
+
+    @property
+    @abstractmethod
+    def verdict(self) -> str:
+        """One sentence."""
+
+    @property
+    @abstractmethod
+    def outcome(self) -> tuple[str, str]:
+        """Its first word, and its kind: passed, warning or failed."""
+
+    @property
+    @abstractmethod
+    def charts(self) -> list[Chart]:
+        """The charts of its figure."""
+
+    @property
+    @abstractmethod
+    def figure(self) -> str:
+        """Name of the figure, without ending."""
+
+    @property
+    @abstractmethod
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Its main numbers, the most important table first; empty ones are not shown."""
+
+    @property
+    @abstractmethod
+    def notes(self) -> tuple[str, ...]:
+        """What a reader has to know beside the tables, a sentence each."""
+
+    @property
+    def scene(self) -> AnyScene:
+        """The scene on its page; one that is not that of the question is a file too."""
+        return self.source
+
+    def as_dict(self) -> dict[str, Any]:
+        """Verdict, tables and notes as JSON takes them: numbers have all their digits."""
+        return {
+            "scene": self.source.name,
+            "title": self.source.title,
+            "outcome": self.outcome[0],
+            "verdict": self.verdict,
+            "tables": [table.as_dict() for table in self.tables if table.rows],
+            "notes": self.notes,
+            "versions": versions(),
+        }
+
+    def page(self, charts: Sequence[Chart]) -> str:
+        """Its page as HTML that needs nothing beside it.
+
+        Parameters
+        ----------
+        charts
+            Those of its figure.
+        """
+        word, kind = self.outcome
+        sections = [
+            Section("Answer", self.tables),
+            Section("Notes", texts=self.notes),
+            Section("Figures", charts=charts),
+            Section("Scene file", file=self._scene_file),
+        ]
+        title = self.source.title or self.source.name
+        verdict = (kind, word, f"{self.verdict}.")
+        return page_text(title, sections, verdict=verdict, footer=versions_text(versions()))
+
+    @property
+    def _scene_file(self) -> str:
+        return f"# {self.verdict}\n{scene_as_run(self.scene)}"
+
+    def write(self, out: str | Path) -> Self:
+        """Write figure, page, numbers and a new scene into a folder, all of them or none; the same
+        with it.
+
+        Parameters
+        ----------
+        out
+            The folder, made where there is none.
+
+        Raises
+        ------
+        InputError
+            When it cannot be written.
+        """
+        # matplotlib is slow to import
+        from upd.plot.matplotlib import write_sheets
+
+        charts, folder = self.charts, Path(out)
+        summary = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
+        files = {"summary.json": summary, "report.html": self.page(charts)}
+        if self.scene is not self.source:
+            files[f"{self.scene.name}.toml"] = self._scene_file
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with whole_files(folder) as stage:
+                for file, content in files.items():
+                    (stage / file).write_text(content, encoding="utf-8")
+                write_sheets(charts, stage)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
+            ) from None
+        return replace(self, folder=folder)
+
+    def plot(self) -> list[Any]:
+        """Draw the charts of its figure with matplotlib, and return the axes."""
+        from upd.plot.matplotlib import draw_all
+
+        return draw_all(self.charts)
+
+    def table(self) -> str:
+        """Its verdict, all its tables and its notes as text."""
+        lines = wrapped(self.verdict, WIDTH)
+        for table in self.tables:
+            lines += [text for text, _ in table_lines(table, WIDTH)]
+        lines += [""] * bool(self.notes)
+        return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
+
+    def __repr__(self) -> str:
+        return opened(self.table())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from upd.results.answer_table import AnswerTable
@@ -23,18 +22,8 @@ SHORT = 10
 _WORDS = 20
 
 
-@dataclass(frozen=True)
-class _Column:
-    """A column: its head and its cells, all of one or more lines; numbers are flush right."""
-
-    head: str
-    cells: tuple[str, ...]
-    right: bool = False
-
-    @property
-    def width(self) -> int:
-        """Characters of the longest line."""
-        return max(len(line) for text in (self.head, *self.cells) for line in text.split("\n"))
+#: whether it holds numbers, flush right; its head and its cells, of one or more lines
+Column = tuple[bool, tuple[str, ...]]
 
 
 def text_width() -> int:
@@ -67,17 +56,20 @@ def whole_table(table: AnswerTable, width: int, *, cut: bool = False) -> list[st
     Words are folded where that is enough; else the columns that find no room stand below, beside
     the first ones again, or, where the table may be ``cut``, its last ones are left out.
     """
-    columns = _columns(table)
+    columns = [
+        (head.startswith("#"), (folded_head(head.lstrip("# "), max(map(len, cells))), *cells))
+        for head, cells in zip(table.columns, zip(*table.rows, strict=True), strict=True)
+    ]
     while cut and len(columns) > 2 and _wide(columns) > width:
         columns.pop()
     whole = _folded(columns, width)
     if _wide(whole) <= width:
         return _lines(whole)
     # the words before the first numbers tell what a row is of
-    first = next((k for k, column in enumerate(columns) if k and column.right), 1)
-    groups: list[list[_Column]] = []
+    first = next((k for k, (right, _) in enumerate(columns) if k and right), 1)
+    groups: list[list[Column]] = []
     for column in columns[first:]:
-        if column.head == "±" and groups:
+        if column[1][0] == "±" and groups:
             groups[-1].append(column)
         else:
             groups.append([column])
@@ -89,44 +81,37 @@ def whole_table(table: AnswerTable, width: int, *, cut: bool = False) -> list[st
     return [line for block in blocks for line in _lines(_folded(block, width))]
 
 
-def _columns(table: AnswerTable) -> list[_Column]:
-    return [
-        _Column(folded_head(head.lstrip("# "), max(map(len, cells))), cells, head.startswith("#"))
-        for head, cells in zip(table.columns, zip(*table.rows, strict=True), strict=True)
-    ]
+def _width(column: Column) -> int:
+    """Characters of the longest line."""
+    return max(len(line) for text in column[1] for line in text.split("\n"))
 
 
-def _wide(columns: Sequence[_Column]) -> int:
-    return sum(column.width for column in columns) + GAP * (len(columns) - 1)
+def _wide(columns: Sequence[Column]) -> int:
+    return sum(map(_width, columns)) + GAP * (len(columns) - 1)
 
 
-def _folded(columns: Sequence[_Column], width: int) -> list[_Column]:
+def _folded(columns: Sequence[Column], width: int) -> list[Column]:
     """The columns with the words of the widest, one after the other, folded as far as they can be
     read.
     """
     out = list(columns)
-    for k in sorted((k for k, c in enumerate(out) if not c.right), key=lambda k: -out[k].width):
-        over, column = _wide(out) - width, out[k]
-        if over > 0:
-            words = [word for text in (column.head, *column.cells) for word in text.split()]
-            most = max(column.width - over, min(column.width, _WORDS), *map(len, words))
-            cells = tuple("\n".join(textwrap.wrap(cell, most)) for cell in column.cells)
-            out[k] = replace(column, head=folded_head(column.head, most), cells=cells)
+    for k in sorted(range(len(out)), key=lambda k: -_width(out[k])):
+        (right, texts), over, mine = out[k], _wide(out) - width, _width(out[k])
+        if over > 0 and not right:
+            words = [len(word) for text in texts for word in text.split()]
+            most = max(mine - over, min(mine, _WORDS), *words)
+            head, *cells = texts
+            folded = ("\n".join(textwrap.wrap(cell, most)) for cell in cells)
+            out[k] = right, (folded_head(head, most), *folded)
     return out
 
 
-def _lines(columns: Sequence[_Column]) -> list[str]:
+def _lines(columns: Sequence[Column]) -> list[str]:
     """Heads, which end on one line, and rows, whose cells begin on one."""
-    heads = [column.head.split("\n") for column in columns]
-    most = max(map(len, heads))
-    lines = list(zip(*([""] * (most - len(head)) + head for head in heads), strict=True))
-    for row in zip(*(column.cells for column in columns), strict=True):
+    heads, *rows = zip(*(texts for _, texts in columns), strict=True)
+    most = max(head.count("\n") for head in heads)
+    lines: list[tuple[str, ...]] = []
+    for row in (["\n" * (most - head.count("\n")) + head for head in heads], *rows):
         lines += zip_longest(*(cell.split("\n") for cell in row), fillvalue="")
-    aligned = (
-        [
-            text.rjust(column.width) if column.right else text.ljust(column.width)
-            for column, text in zip(columns, line, strict=True)
-        ]
-        for line in lines
-    )
-    return [(" " * GAP).join(cells).rstrip() for cells in aligned]
+    forms = [f"{{:{'>' if column[0] else '<'}{_width(column)}}}" for column in columns]
+    return [(" " * GAP).join(forms).format(*line).rstrip() for line in lines]

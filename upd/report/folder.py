@@ -5,85 +5,49 @@ Nothing of it is trusted to be whole.
 
 from __future__ import annotations
 
-import fnmatch
 import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from PIL import Image
 
 from upd.cache.files import json_text
 from upd.cache.folders import plain_name
-from upd.errors import InputError
-from upd.labels import sentence
-from upd.results import Arrays, read_netcdf
+from upd.errors import InputError, one_line
+from upd.labels import listed, sentence
+from upd.results import Arrays, Group, read_netcdf
 
-_LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
+_LOG_LINE = re.compile(
+    r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$", re.MULTILINE
+)
 _VERSIONS = "versions: "
 #: key of a JSON file: SHA-256 of what else it has
 _DIGEST = "sha256"
-_PNG = b"\x89PNG\r\n\x1a\n"
 #: names of the figures a run may leave, without their ending
-FIGURES = (
-    "pressure",
-    "pressure_sections",
-    "force_approach",
-    "over_load",
-    "stick_slip",
-    "traction",
-    "hysteresis",
-    "contact_open",
-    "surface",
-    "force_displacement",
-    "contact_law",
-    "response",
-    "response_harmonics",
-    "damping",
-    "contact_state",
-    "contact_map",
-    "damper_motion",
-    "damper_period",
-    "seating",
-    "performance",
-    "nonlinear_modes",
-    "modes_free",
-    "modes_glued",
-    "dimensions",
-    "nodal_diameters",
-    "campbell",
-    "interference",
-)
-#: What a run may write, whatever its analysis; all that may be removed when a run replaces another.
-RUN_FILES = (
-    "scene.toml",
-    "run.log",
-    "summary.json",
-    "result.nc",
-    "report.html",
-    "mesh.vtu",
-    "fields.vtu",
-    "modes_*.vtu",
-    "reduced_*.nc",
-    "matrices/reduced_*",
-    "curves/*.csv",
-    *(f"{name}.png" for name in FIGURES),
+_FIGURES = (
+    "pressure pressure_sections force_approach over_load stick_slip traction hysteresis "
+    "contact_open surface force_displacement contact_law response response_harmonics damping "
+    "contact_state contact_map damper_motion damper_period seating performance nonlinear_modes "
+    "modes_free modes_glued dimensions nodal_diameters campbell interference"
 )
 #: names that the operating system or a viewer leaves
 _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
-Kind = Literal["run", "sweep"]
+#: What a run may write, whatever its analysis; all that may be removed when a run replaces another.
+_RUN_FILES = (
+    *("scene.toml", "run.log", "summary.json", "result.nc", "report.html", "mesh.vtu"),
+    *("fields.vtu", "modes_*.vtu", "reduced_*.nc", *_NOBODYS),
+    *(f"{name}.png" for name in _FIGURES.split()),
+)
+#: what it may write into folders of its own
+_INNER_FILES = ("curves/*.csv", "matrices/reduced_*", *_NOBODYS)
+#: kind of values -> keys of summary.json
+_SUMMARY = {str: "scene title status", list: "effects checks results", dict: "size cost"}
 Kept = TypeVar("Kept")
-#: kind of a folder -> what makes its files again
-_AGAIN: dict[Kind, str] = {
-    "run": "run the scene again",
-    "sweep": "start the same sweep again, finished points are kept",
-}
-#: faults of a file that a message names
-_MOST = 4
 
 
 @dataclass(frozen=True)
@@ -123,21 +87,10 @@ def is_run_file(entry: Path) -> bool:
     """Whether an entry of a run folder, a file or a folder with all it holds, is one that runs
     write.
     """
-    if entry.is_symlink():
-        return False
-    if entry.is_dir():
-        inner = list(entry.iterdir())
-        return bool(inner) and all(
-            one.is_file() and _is_known(f"{entry.name}/{one.name}") for one in inner
-        )
-    return _is_known(entry.name)
-
-
-def _is_known(name: str) -> bool:
-    return name in _NOBODYS or any(
-        name.count("/") == pattern.count("/") and fnmatch.fnmatchcase(name, pattern)
-        for pattern in RUN_FILES
-    )
+    if entry.is_symlink() or not entry.is_dir():
+        return not entry.is_symlink() and any(map(entry.match, _RUN_FILES))
+    inner = list(entry.iterdir())
+    return bool(inner) and all(one.is_file() and any(map(one.match, _INNER_FILES)) for one in inner)
 
 
 def check_replaceable(folder: Path) -> None:
@@ -145,32 +98,11 @@ def check_replaceable(folder: Path) -> None:
     it.
     """
     foreign = sorted(entry.name for entry in folder.iterdir() if not is_run_file(entry))
-    if not _is_run(folder):
+    if foreign or not (folder / "run.log").is_file():
+        what = listed(foreign, 3, "what no run wrote ({})") or "no run"
         raise InputError(
-            f"the folder {folder} is not empty and holds no run: choose another with --out, or "
-            "empty it"
+            f"the folder {folder} holds {what}: choose another with --out, or move that away"
         )
-    if foreign:
-        shown = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" * (len(foreign) > 3))
-        raise InputError(
-            f"the run folder {folder} also holds what no run wrote ({shown}): move that away, or "
-            "choose another folder with --out"
-        )
-
-
-def _is_run(folder: Path) -> bool:
-    """Whether the log is one of a run, or the summary can be read."""
-    try:
-        with (folder / "run.log").open(encoding="utf-8") as file:
-            found = _LOG_LINE.match(file.readline().rstrip("\n"))
-        if found and found["text"].startswith(_VERSIONS):
-            return True
-    except (OSError, UnicodeDecodeError):
-        pass
-    try:
-        return bool(_summary(folder))
-    except InputError:
-        return False
 
 
 def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
@@ -178,77 +110,47 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
     Raises InputError when there is no summary, and for a damaged result.nc where ``whole``.
     """
-    summary = _summary(folder)
+    summary = read_json(folder / "summary.json", _SUMMARY, "run")
     missing: list[str] = []
-    scene = _text(folder / "scene.toml", missing)
-    tables: dict[str, Any] = {}
-    try:
-        tables = tomllib.loads(scene)
-    except tomllib.TOMLDecodeError as problem:
-        missing.append(f"scene.toml: is not TOML ({problem})")
-    arrays: Arrays = {}
-    if (folder / "result.nc").exists():
+
+    def part(file: Path, read: Callable[[Path], Kept], default: Kept) -> Kept:
         try:
-            arrays = read_netcdf(folder / "result.nc")
-        except OSError as problem:
-            if whole:
-                raise InputError(f"{folder / 'result.nc'}: cannot be read ({problem})") from None
-            missing.append(f"result.nc: cannot be read ({problem})")
-    else:
-        missing.append("result.nc: is not there, so there are no curves")
-    pictures = {f.stem: f for f in sorted(folder.glob("*.png"))}
-    figures = {name: f for name, f in pictures.items() if is_png(f)}
-    missing += [f"{f.name}: is no PNG file" for name, f in pictures.items() if name not in figures]
-    log = _text(folder / "run.log", missing).splitlines()
+            return read(file)
+        except (OSError, ValueError, SyntaxError) as problem:
+            missing.append(f"{file.name}: cannot be read ({one_line(problem)})")
+            return default
+
+    arrays: dict[str, Group] = part(folder / "result.nc", read_netcdf, {})
+    if whole and missing and (folder / "result.nc").exists():
+        raise InputError(f"{folder}/{missing[0]}")
+    scene = part(folder / "scene.toml", _toml, "")
+    pictures = {f.stem: part(f, _picture, None) for f in sorted(folder.glob("*.png"))}
     return RunFolder(
         path=folder,
-        summary=summary | {"scene_file": tables},
+        summary=summary | {"scene_file": tomllib.loads(scene)},
         arrays=arrays,
-        figures=figures,
+        figures={name: file for name, file in pictures.items() if file is not None},
         scene=scene,
-        log=tuple(filter(None, map(_LOG_LINE.match, log))),
+        log=tuple(_LOG_LINE.finditer(part(folder / "run.log", _text, ""))),
         missing=tuple(missing),
     )
 
 
-def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", _Summary, "run")[0]
+def _text(path: Path) -> str:
+    return path.read_text("utf-8")
 
 
-def _text(path: Path, missing: list[str]) -> str:
-    try:
-        return path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        missing.append(
-            f"{path.name}: cannot be read ({getattr(problem, 'strerror', None) or problem})"
-        )
-        return ""
+def _toml(path: Path) -> str:
+    """Text of a TOML file. Raises ValueError where it is none."""
+    tomllib.loads(text := _text(path))
+    return text
 
 
-def is_png(path: Path) -> bool:
-    """Whether a file can be read and begins as every PNG does."""
-    try:
-        with path.open("rb") as file:
-            return file.read(len(_PNG)) == _PNG
-    except OSError:
-        return False
-
-
-# ---------------------------------------------------------------- JSON files, checked once
-
-
-@dataclass
-class _Summary:
-    """What summary.json must have; there may be more, and its digest holds all of it."""
-
-    scene: str
-    title: str
-    status: str
-    effects: list[dict[str, Any]]
-    checks: list[dict[str, Any]]
-    size: dict[str, Any]
-    cost: dict[str, Any]
-    results: list[dict[str, Any]]
+def _picture(path: Path) -> Path | None:
+    """A PNG file. Raises OSError or SyntaxError where it is damaged."""
+    with Image.open(path, formats=["PNG"]) as image:
+        image.verify()
+    return path
 
 
 def sealed(data: Mapping[str, Any]) -> str:
@@ -256,49 +158,41 @@ def sealed(data: Mapping[str, Any]) -> str:
     return json_text({**data, _DIGEST: hashlib.sha256(json_text(data).encode()).hexdigest()})
 
 
-def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
-    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote: all there is,
-    and what must be there.
+def read_json(path: Path, keys: Mapping[Any, str], kind: str) -> dict[str, Any]:
+    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
 
     Parameters
     ----------
     path
         Of the file.
-    schema
-        Dataclass of what it must have; there may be more.
+    keys
+        What it must have, by the kind of the values; there may be more.
     kind
-        Of the folder.
+        Of the folder: run or sweep.
 
     Raises
     ------
     InputError
-        When there is none, or something of it is missing or of another kind.
+        When there is none, something of it is missing, or it was changed.
     """
+    again = f"call upd {kind} again"
     try:
-        text = path.read_text("utf-8")
-        found = json.loads(text)
-        checked = TypeAdapter(schema).validate_json(text, strict=True)
+        found = json.loads(path.read_text("utf-8"))
+        names = [(name, of) for of, mine in keys.items() for name in mine.split()]
+        missing = [name for name, of in names if not isinstance(found.get(name), of)]
+        # folders of earlier versions have no digest
+        rest = {key: found[key] for key in found if key != _DIGEST}
     except (FileNotFoundError, NotADirectoryError):
         raise InputError(
             f"{path.parent}: is no {kind} folder (it has no {path.name}); give the folder "
             f"`upd {kind}` wrote"
         ) from None
     except OSError as problem:
-        raise InputError(
-            f"{path}: cannot be read ({problem.strerror}); check its permissions"
-        ) from None
-    except ValidationError as problem:
-        places = [".".join(map(str, e["loc"])) or "the whole" for e in problem.errors()]
-        names = list(dict.fromkeys(places))
-        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
-        raise InputError(
-            f"{path}: is damaged in {', '.join(names[:_MOST])}{more}; {_AGAIN[kind]}"
-        ) from None
-    except (ValueError, RecursionError) as problem:
-        raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
-    # folders of earlier versions have no digest
-    if _DIGEST in found and json_text(found) != sealed(
-        {k: found[k] for k in found if k != _DIGEST}
-    ):
-        raise InputError(f"{path}: is not as upd {kind} wrote it (SHA-256); {_AGAIN[kind]}")
-    return dict(found), checked
+        raise InputError(f"{path}: cannot be read ({one_line(problem)})") from None
+    except (ValueError, AttributeError, RecursionError) as problem:
+        raise InputError(f"{path}: is not JSON of a {kind} ({problem}); {again}") from None
+    if missing:
+        raise InputError(f"{path}: is damaged in {', '.join(missing)}; {again}")
+    if _DIGEST in found and json_text(found) != sealed(rest):
+        raise InputError(f"{path}: is not as upd {kind} wrote it (SHA-256); {again}")
+    return rest

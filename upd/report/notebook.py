@@ -1,31 +1,50 @@
-"""The result of a run, and how it shows itself in a notebook.
-
-Text, table, figure of the main curves, xarray.
+"""The result of a run: text, table, figure of the main curves, xarray; PNG figures and CSV curves
+of its folder.
 """
 
 from __future__ import annotations
 
+import csv
+import io
+import logging
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from upd.errors import ConvergenceError, InputError, did_you_mean
-from upd.report.answer import AnswerLine, answer, short_answer
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.cache.files import write_text
+from upd.errors import ConvergenceError, InputError, UpdError, did_you_mean
+from upd.labels import file_name
+from upd.mesh import recipes
+from upd.plot.chart import Chart
+from upd.report.answer import AnswerLine, answer, opened
 from upd.report.columns import text_width
 from upd.report.folder import read_run
 from upd.report.tables import analysis_charts
-from upd.results import Case, Check, Result
-from upd.results.check import outcome_of
-from upd.results.number import from_json, read_result
+from upd.results import Arrays, Case, Check, Group, Result, Variable
+from upd.results.check import outcome_of, read_check
+from upd.results.number import read_result
+from upd.results.quantities import number_title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from upd.plot.chart import Chart, Entry
-    from upd.results import Arrays
+log = logging.getLogger(__name__)
 
+#: dimension of a pair of real and imaginary part
+_PART = "part"
+#: dimensions whose tables stand among the numbers of summary.json
+_PEAKS = "peak"
+#: dimensions of a map on a face
+_PLACES = ("x", "y")
+#: dimension along which each entry of another dimension is a curve of its own
+_SAMPLE = "sample"
+
+Column = tuple[str, NDArray[np.generic]]
 #: charts of the figure nobody chose
 _MOST_CHARTS = 6
 
@@ -89,8 +108,9 @@ class RunResult:
             cases = ", ".join(f'"{r.case}"' for r in rows)
             raise InputError(f'{name} has several cases: write value("{name}", case) with {cases}')
         if row.withheld:
-            label = f" of {row.case}" if row.case.label else ""
-            raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
+            raise ConvergenceError(
+                f"{number_title(name, str(row.case))}: not reached, {row.withheld}"
+            )
         return row.value
 
     def summary(self) -> dict[str, Any]:
@@ -132,17 +152,14 @@ class RunResult:
         if ax is None:
             return draw_all(chosen)
         if len(chosen) > 1:
-            meant = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
-            raise InputError(
-                f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
-            )
+            raise InputError(f"plot: ax takes one of {len(chosen)} charts; give title and case")
         return [draw(chosen[0], ax)]
 
     def table(self) -> str:
         """Its answer as the terminal prints it with --full: all numbers with the bounds of their
         errors, effects, checks, sources of errors, cost.
         """
-        return "\n".join(line.text for line in self.answer(text_width(), full=True))
+        return "\n".join(text for text, _ in self.answer(text_width(), full=True))
 
     def to_xarray(self) -> dict[str, Any]:
         """Case -> xarray.Dataset, with dimensions, coordinates and units; needs xarray."""
@@ -163,9 +180,7 @@ class RunResult:
         return answer(self.summary(), width, self.folder, self.faults, full=full)
 
     def __repr__(self) -> str:
-        return "\n".join(short_answer(self.summary(), text_width(), self.folder))
-
-    __str__ = __repr__
+        return opened("\n".join(text for text, _ in self.answer(text_width())))
 
 
 def charts(result: RunResult) -> list[Chart]:
@@ -180,13 +195,14 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         raise InputError("plot: the run left no arrays to draw; its numbers are in .results")
     if title is None and case is None:
         return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
-    mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
+    mine = [c for c in found if (title or "").casefold() in c.title.casefold()]
     if not mine:
         raise _unknown("chart", str(title), [c.title for c in found])
-    cases = [c for c in mine if case is None or c.case == case]
-    if not cases:
-        raise _unknown("chart of the case", str(case), [c.case for c in mine if c.case])
-    return cases[:_MOST_CHARTS] if case is None else cases
+    if case is None:
+        return mine[:_MOST_CHARTS]
+    if cases := [c for c in mine if c.case == case]:
+        return cases
+    raise _unknown("chart of the case", case, [c.case for c in mine if c.case])
 
 
 def _unknown(what: str, word: str, known: Iterable[str]) -> InputError:
@@ -221,14 +237,10 @@ def load(folder: str | Path) -> RunResult:
     run = read_run(Path(folder), whole=True)
     summary = run.summary
     return RunResult(
-        scene=summary["scene"],
-        title=summary["title"],
-        status=summary["status"],
-        results=tuple(read_result(entry, _case(entry)) for entry in summary["results"]),
-        effects=tuple(dict(effect) for effect in summary["effects"]),
-        checks=tuple(from_json(Check, entry, case=_case(entry)) for entry in summary["checks"]),
-        size=summary["size"],
-        cost=summary["cost"],
+        **{key: summary[key] for key in ("scene", "title", "status", "size", "cost")},
+        results=tuple(map(read_result, summary["results"])),
+        effects=tuple(summary["effects"]),
+        checks=tuple(map(read_check, summary["checks"])),
         # A file has no slash in the name of a group.
         arrays={name.replace(" per ", "/"): group for name, group in run.arrays.items()},
         folder=run.path,
@@ -236,7 +248,116 @@ def load(folder: str | Path) -> RunResult:
     )
 
 
-def _case(entry: Entry) -> Case:
-    """The case from its fields; of unknown fields, from its words."""
-    case = from_json(Case, entry["case_fields"])
-    return case if case.label == entry["case"] else Case(name=entry["case"])
+# -- files of its folder: figures, and curves as CSV for other programs ----------------------------
+
+
+def write_figures(result: RunResult, folder: Path) -> list[Path]:
+    """Draw the charts of a run as PNG, those of one figure on one sheet.
+
+    Figures that lie there already stay. Returns what was written.
+    """
+    # matplotlib takes a while to import
+    from upd.plot.matplotlib import write_sheets
+
+    written = write_sheets(charts(result), folder, keep=True)
+    return written + write_dimensions(result, folder / "dimensions.png")
+
+
+def write_dimensions(result: RunResult, path: Path) -> list[Path]:
+    """Draw the recipe's sections with their dimensions, unless its meshes cannot be made."""
+    recipe = str(tomllib.loads(result.scene_text)["geometry"]["recipe"])
+    try:
+        meshes, views = recipes.drawing(recipe, result.size["mesh"])
+    except UpdError as problem:
+        log.info("no drawing of the geometry: %s", problem)
+        return []
+    # matplotlib takes a while to import
+    from upd.plot.drawing import draw_sections
+    from upd.plot.matplotlib import write_png
+
+    return write_png(draw_sections(meshes, views), path)
+
+
+def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
+    """Write every curve of the arrays to ``folder``/curves, a file per group and dimension.
+
+    Columns are the variables that run along one dimension, with their unit in the header:
+    ``frequency [Hz]``; a complex one has its real and imaginary part and its amplitude. Maps over x
+    and y have a row for every place.
+
+    Parameters
+    ----------
+    arrays
+        Group -> name -> `Variable`, as they stand in result.nc.
+    folder
+        Run folder.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of the groups.
+
+    Raises
+    ------
+    OSError
+        As the file system does.
+    """
+    files: list[Path] = []
+    for name, group in arrays.items():
+        begin = file_name(name.replace("/", " per ") or "run")
+        for k, (dimension, columns) in enumerate(dict(_tables(group)).items()):
+            stem = begin + (f"-{file_name(dimension)}" if k else "")
+            path = folder / "curves" / f"{stem}.csv"
+            path.parent.mkdir(exist_ok=True)
+            write_text(
+                path, as_csv(zip(*([head, *data.tolist()] for head, data in columns), strict=True))
+            )
+            files.append(path)
+    return files
+
+
+def as_csv(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as CSV; what is not known is empty."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows(rows)
+    return out.getvalue()
+
+
+def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:
+    """Dimension -> its columns, where there is something to draw over something else."""
+    for dimension in dict.fromkeys(d for v in group.values() for d in v.dims):
+        columns = [one for name, v in group.items() for one in _columns(name, v, dimension)]
+        several = len(columns) > 1 and len(columns[0][1]) > 1
+        if several and not dimension.startswith(_PEAKS):
+            yield dimension, columns
+    maps = {name: v for name, v in group.items() if v.dims[:2] == _PLACES}
+    if maps and all(axis in group for axis in _PLACES):
+        lines = np.meshgrid(*(group[axis].data for axis in _PLACES), indexing="ij")
+        columns = [
+            _column(axis, group[axis], line) for axis, line in zip(_PLACES, lines, strict=True)
+        ]
+        for name, v in maps.items():
+            # a column for each of its components
+            parts = v.data.reshape(lines[0].size, -1).T
+            columns += _numbered(name, v, parts) if len(parts) > 1 else [_column(name, v, parts)]
+        yield "map", columns
+
+
+def _columns(name: str, variable: Variable, dimension: str) -> Iterator[Column]:
+    data, dims = variable.data, variable.dims
+    if dims == (dimension,):
+        yield _column(name, variable, data)
+    elif dims == (dimension, _PART):
+        kinds = {"real": data[:, 0], "imaginary": data[:, 1], "amplitude": np.hypot(*data.T)}
+        yield from (_column(f"{name} {kind}", variable, one) for kind, one in kinds.items())
+    elif dimension == _SAMPLE and len(dims) == 2 and dims[1] == dimension:
+        yield from _numbered(f"{name} {dims[0]}", variable, data)
+
+
+def _column(name: str, variable: Variable, data: NDArray[np.generic]) -> Column:
+    """Name with unit, and values of a column."""
+    return f"{name} [{variable.units}]" if variable.units else name, data.ravel()
+
+
+def _numbered(name: str, variable: Variable, rows: NDArray[np.generic]) -> list[Column]:
+    return [_column(f"{name} {k}", variable, row) for k, row in enumerate(rows, 1)]

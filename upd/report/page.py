@@ -8,11 +8,11 @@ import io
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -21,7 +21,7 @@ from upd.cache.files import placed_file
 from upd.labels import sentence
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
-from upd.report.tables import MOST_NOTES
+from upd.report.tables import MOST_NOTES, filled
 from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
@@ -42,34 +42,14 @@ _HEADINGS = {
     "modes_glued": "Mode shapes, damper glued",
     "dimensions": "Geometry and its dimensions",
 }
+#: parts of sections, of which one without any is omitted
+_PARTS_OF_SECTIONS = ("tables", "notes", "panels", "texts", "file", "surfaces")
 #: figures beside the first tables
 _OPENED = 2
 
 
-class Verdict(NamedTuple):
-    """How it ended: passed, warning or failed, the word for it, and a sentence."""
-
-    kind: str
-    word: str
-    text: str
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One figure of the page.
-
-    Attributes
-    ----------
-    image
-        Data URI of the picture that needs no script.
-    charts
-        In the order of the page; those of one title share a place.
-    """
-
-    name: str
-    heading: str
-    image: str
-    charts: tuple[Chart, ...]
+#: how it ended: passed, warning or failed, the word for it, and a sentence
+Verdict = tuple[str, str, str]
 
 
 class Section(NamedTuple):
@@ -77,36 +57,26 @@ class Section(NamedTuple):
 
     Attributes
     ----------
-    tables, notes, panels, texts, file
+    tables, notes, charts, texts, file
         In this order below the heading; of more than three notes the others are folded.
+    pictures
+        Name of a figure -> PNG file: drawings of its charts, or without any.
     surfaces
-        Whether the view in three dimensions belongs to it.
-    kind
-        Of its tables: rows that become lists on a phone, or a grid, which may scroll.
+        Drawn in three dimensions.
     folded, each_folded
         The section, or each of its tables and figures, opens when asked.
-    opening
-        The page opens on it: tables beside figures.
     """
 
     heading: str
     tables: Sequence[AnswerTable] = ()
     notes: Sequence[str] = ()
-    panels: Sequence[Panel] = ()
+    charts: Sequence[Chart] = ()
     texts: Sequence[str] = ()
     file: str = ""
-    surfaces: bool = False
-    kind: Literal["stack", "grid", "tall"] = "stack"
+    pictures: Mapping[str, Path] = MappingProxyType({})
+    surfaces: Sequence[dict[str, Any]] = ()
     folded: bool = False
     each_folded: bool = False
-    opening: bool = False
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether there is nothing to show."""
-        has_rows = any(table.rows for table in self.tables)
-        shown = self.notes or self.panels or self.texts or self.file or self.surfaces
-        return not (has_rows or shown)
 
 
 def write_page(path: Path, html: str) -> Path:
@@ -120,29 +90,23 @@ def write_page(path: Path, html: str) -> Path:
 
 
 def page_text(
-    title: str,
-    sections: Sequence[Section],
-    *,
-    verdict: Verdict | None = None,
-    footer: str = "",
-    surfaces: Sequence[dict[str, Any]] = (),
+    title: str, sections: Sequence[Section], *, verdict: Verdict | None = None, footer: str = ""
 ) -> str:
     """The page as HTML, with the surfaces that are not too large. Where its first
     section has tables, it opens on them beside the first figures, and all else but notes is folded.
     Sections without content are omitted.
     """
-    found = [
-        section._replace(tables=[table for table in section.tables if table.rows])
-        for section in sections
-        if not section.is_empty
-    ]
-    panels = [panel for section in found for panel in section.panels]
-    if found and found[0].tables:
-        shown = panels[:_OPENED]
-        first = found[0]._replace(panels=shown, opening=True)
-        found = [first, *(_folded(s, shown) for s in found[1:])]
-        found = [section for section in found if not section.is_empty]
-    bodies, left_out = fitting(surfaces)
+    found = [_content(one) for one in sections]
+    panels = [panel for one in found for panel in one["panels"]]
+    if found and found[0]["tables"]:
+        shown = found[0]["panels"] = panels[:_OPENED]
+        for one in found[1:]:
+            one["panels"] = [panel for panel in one["panels"] if panel not in shown]
+            one["each_folded"] |= bool(one["panels"] or one["surfaces"])
+            one["folded"] = not (one["each_folded"] or one["notes"])
+    found = [one for one in found if any(one[part] for part in _PARTS_OF_SECTIONS)]
+    bodies, left_out = fitting(surface for one in found for surface in one["surfaces"])
+    data = {panel["name"]: panel["groups"] for panel in panels if panel["groups"]}
     page = _environment().get_template("page.html.j2")
     return page.render(
         title=title,
@@ -155,16 +119,18 @@ def page_text(
         style=(_PARTS / "page.css").read_text("utf-8"),
         plotly=_packed_plotly(),
         script=(_PARTS / "page.js").read_text("utf-8"),
-        page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
+        page_data=_packed(_json({"panels": data, "surfaces": bodies})),
     )
 
 
-def _folded(section: Section, shown: Sequence[Panel]) -> Section:
-    """A section, or each of its figures, that opens when asked; without figures shown before."""
-    panels = [panel for panel in section.panels if panel not in shown]
-    each = bool(panels or section.surfaces)
-    folded = not (each or section.notes)
-    return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
+def _content(section: Section) -> dict[str, Any]:
+    """A section for the template: tables with rows, and panels."""
+    tables = []
+    for one in section.tables:
+        cells = dict(zip(one.columns, zip(*one.rows, strict=True), strict=False))
+        tables += [filled(one.heading, cells, one.note)] if cells else []
+    panels = _panels(section.charts, section.pictures)
+    return {**section._asdict(), "tables": tables, "charts": (), "pictures": (), "panels": panels}
 
 
 @cache
@@ -225,60 +191,52 @@ def versions_text(versions: Mapping[str, str]) -> str:
 # ---------------------------------------------------------------- figures
 
 
-def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
-    """Charts with the PNG files that show the same, then the other PNG files."""
+def _panels(charts: Iterable[Chart], pictures: Mapping[str, Path]) -> list[dict[str, Any]]:
+    """Charts with the PNG files that show the same, then the other PNG files: name, heading, data
+    URI of the picture, and groups of one title, which share a place, for the page's script.
+    """
     # matplotlib is slow to import
     from upd.plot.matplotlib import chart_png
 
-    groups: dict[str, list[Chart]] = {}
+    figures: dict[str, list[Chart]] = {name: [] for name in (c.figure or c.title for c in charts)}
     for chart in charts:
-        groups.setdefault(chart.figure or chart.title, []).append(chart)
+        figures[chart.figure or chart.title].append(chart)
     panels = []
-    for name in dict.fromkeys([*groups, *figures]):
-        group = groups.get(name, [])
+    for name, mine in (figures | {name: [] for name in pictures if name not in figures}).items():
         heading = _HEADINGS.get(name, name.replace("_", " ").capitalize())
-        if group:
-            heading = group[0].heading or group[0].title
+        if mine:
+            heading = mine[0].heading or mine[0].title
         # at most six charts: a sheet of more is not read
-        drawn = [chart for chart in group if chart.sheet][:6] or group[:6]
-        png = figures[name].read_bytes() if name in figures else chart_png(drawn)
-        panels.append(Panel(name, heading, image_uri(png), tuple(group)))
+        drawn = [chart for chart in mine if chart.sheet][:6] or mine[:6]
+        png = pictures[name].read_bytes() if name in pictures else chart_png(drawn)
+        titles = dict.fromkeys(chart.title for chart in mine)
+        groups = [
+            {"title": title, "charts": [_data(c) for c in mine if c.title == title]}
+            for title in titles
+        ]
+        panels.append({"name": name, "heading": heading, "image": image_uri(png), "groups": groups})
     return panels
 
 
-def _data(panels: Iterable[Panel]) -> dict[str, Any]:
-    """What the page's script draws: panel -> list of {title, note, charts}."""
-    found: dict[str, list[dict[str, Any]]] = {}
-    for panel in panels:
-        for title in dict.fromkeys(chart.title for chart in panel.charts):
-            charts = [
-                {
-                    "case": c.case.replace("muN", "µN"),
-                    "note": " ".join(filter(None, (sentence(c.detail), c.note))),
-                    "figure": figure(c),
-                }
-                for c in panel.charts
-                if c.title == title
-            ]
-            found.setdefault(panel.name, []).append({"title": title, "charts": charts})
-    return found
+def _data(chart: Chart) -> dict[str, Any]:
+    """A chart for the page's script."""
+    note = " ".join(filter(None, (sentence(chart.detail), chart.note)))
+    return {"case": chart.case.replace("muN", "µN"), "note": note, "figure": figure(chart)}
 
 
 def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
-    """Surfaces with as many of their fields as a page holds, and what had to be left out, in
-    words.
-    """
+    """Surfaces with as many of their fields as a page holds, and what had to be left out."""
     shown, left_out, room = list[dict[str, Any]](), list[str](), MOST_LETTERS
     for surface in surfaces:
-        fields, made = list(surface["fields"]), surface
-        while (size := len(_json(made))) > room and fields:
-            fields.pop()
-            made = surface | {"fields": [*fields]} | ({} if fields else {"motions": []})
-        lost = surface["fields"][len(fields) :] if size <= room else [surface]
+        fields = surface["fields"]
+        counts = range(len(fields), -1, -1)
+        tried = (surface | {"fields": fields[:k]} | ({} if k else {"motions": []}) for k in counts)
+        fit = next((made for made in tried if len(_json(made)) <= room), None)
+        lost = [surface] if fit is None else fields[len(fit["fields"]) :]
         left_out += [f"{one['label']}: too large for this page" for one in lost]
-        if size <= room:
-            shown.append(made)
-            room -= size
+        if fit is not None:
+            shown.append(fit)
+            room -= len(_json(fit))
     return shown, left_out
 
 
@@ -287,12 +245,7 @@ def image_uri(png: bytes) -> str:
     from PIL import Image
 
     out = io.BytesIO()
-    try:
-        with Image.open(io.BytesIO(png)) as image:
-            image.thumbnail((_WIDTH, image.height))
-            image.save(out, "WEBP", quality=80)
-        kind, data = "webp", out.getvalue()
-    except (OSError, SyntaxError):
-        # Damaged: the browser shows what there is of it.
-        kind, data = "png", png
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+    with Image.open(io.BytesIO(png)) as image:
+        image.thumbnail((_WIDTH, image.height))
+        image.save(out, "WEBP", quality=80)
+    return f"data:image/webp;base64,{base64.b64encode(out.getvalue()).decode('ascii')}"

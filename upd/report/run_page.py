@@ -1,36 +1,34 @@
-"""One run folder -> report.html: numbers, figures, errors, checks, cost and the scene file."""
+"""Pages of runs: report.html of one, with numbers, figures, errors, checks, cost, scene file; of
+several, numbers side by side, the same charts overlaid, entries in which the scenes differ.
+"""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from upd.labels import sentence
+from upd.errors import InputError
+from upd.labels import number, percent, sentence, shown
+from upd.plot.chart import Axis, Chart, Entry
+from upd.plot.style import colour_range
 from upd.plot.surface import read_surface
+from upd.report import tables
 from upd.report.answer import checked
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import Section, Verdict, make_panels, page_text, write_page
-from upd.report.tables import (
-    all_numbers,
-    analysis_charts,
-    answer_tables,
-    budget_table,
-    checks_table,
-    effects_table,
-    filled,
-    main_numbers,
-    stage_table,
-    warnings,
-)
+from upd.report.page import Section, Verdict, page_text, write_page
 from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of
+from upd.results.quantities import number_label
+from upd.scene.read import leaves
 
 log = logging.getLogger("upd.report")
 
-#: records of the solvers, whose faults are among the checks, and of all modules of this package
-_SOLVER, _OURS = "upd.hbm", "upd."
+#: below tables of numbers
+UNITS = "A number without a unit is a ratio or a count."
 
 
 def write_run_report(folder: Path) -> Path:
@@ -39,54 +37,39 @@ def write_run_report(folder: Path) -> Path:
     Raises InputError when ``folder`` is no run folder or cannot be written.
     """
     run = read_run(folder)
-    surfaces = run_surfaces(run)
-    html = page_text(
-        run.summary["title"] or run.summary["scene"],
-        run_sections(run, surfaces),
-        verdict=verdict(run.summary),
-        footer=run.origin,
-        surfaces=surfaces,
-    )
+    title = run.summary["title"] or run.summary["scene"]
+    html = page_text(title, run_sections(run), verdict=verdict(run.summary), footer=run.origin)
     return write_page(run.path / "report.html", html)
 
 
-def run_sections(run: RunFolder, surfaces: Sequence[dict[str, Any]]) -> list[Section]:
+def run_sections(run: RunFolder) -> list[Section]:
     """The page of one run."""
     summary, entries = run.summary, run.summary["results"]
     size, cost = summary["size"], summary["cost"]
-    panels = make_panels(analysis_charts(run.arrays, summary), run.figures)
-    tables = answer_tables(size, entries)
-    known = any(entry.get("estimated_error") is not None for entry in entries)
-    about = [
-        "Estimated errors (±) bound what mesh and methods leave in a number; the error budget "
-        "shows their sources."
-        if known
-        else "No errors were estimated.",
-        "A number without a unit is a ratio or a count.",
-    ]
-    figures = Section(
-        "Figures",
-        panels=panels,
-        texts=[] if panels or surfaces else ["The run left no figures."],
-        surfaces=bool(surfaces),
-    )
+    charts, surfaces = tables.analysis_charts(run.arrays, summary), run_surfaces(run)
+    estimated = any(entry.get("estimated_error") is not None for entry in entries)
+    errors = "Errors (±) bound what mesh and methods leave in a number: see the error budget."
+    about = [errors if estimated else "No errors were estimated.", UNITS]
+    main = tables.answer_tables(size, entries)
+    no_figures = ["The run left no figures."] * (not (charts or run.figures or surfaces))
     total = f"{cost['total_s']:.1f} s in all, {cost['peak_rss_mb']:.0f} MB of memory at most."
     return [
-        Section("Main numbers", tables, texts=about if tables else ["The run left no numbers."]),
+        Section("Main numbers", main, texts=about if main else ["The run left no numbers."]),
         Section("Warnings", notes=page_warnings(run)),
-        figures,
-        Section("Error budget", [budget_table(main_numbers(size, entries))]),
+        Section(
+            "Figures", charts=charts, pictures=run.figures, surfaces=surfaces, texts=no_figures
+        ),
+        Section("Error budget", [tables.budget_table(tables.main_numbers(size, entries))]),
         Section(
             "What was simulated, what was left out",
-            [effects_table(summary["effects"]), checks_table(summary["checks"])],
+            [tables.effects_table(summary["effects"]), tables.checks_table(summary["checks"])],
         ),
         Section(
             "Cost and mesh",
-            [stage_table(cost.get("stages", {})), _mesh_table(size)],
+            [tables.stage_table(cost.get("stages", {})), _mesh_table(size)],
             texts=[total],
-            kind="grid",
         ),
-        Section("All numbers", all_numbers(entries), each_folded=True, kind="grid"),
+        Section("All numbers", tables.all_numbers(entries), each_folded=True),
         Section(
             "Scene file",
             texts=["Save as scene.toml and run upd run scene.toml."],
@@ -103,33 +86,31 @@ def _mesh_table(size: Mapping[str, Any]) -> AnswerTable:
         "# hexahedra": [str(size.get("n_hex", {}).get(body, "")) for body in dofs],
         "# degrees of freedom": [str(count) for count in dofs.values()],
     }
-    facts = [f"{size['symmetry']} model"] * bool(size.get("symmetry"))
-    facts += [f"{size['n_pairs']} contact pairs"] * bool(size.get("n_pairs"))
-    return filled("Mesh", columns, f"{', '.join(facts)}.".capitalize() if facts else "")
+    pairs = f"{size['n_pairs']} contact pairs." if size.get("n_pairs") else ""
+    return tables.filled(f"Mesh, {size.get('symmetry', 'whole')} model", columns, pairs)
 
 
 def verdict(summary: Mapping[str, Any]) -> Verdict:
     """How a run ended, with its self-checks."""
     status = str(summary["status"])
     if (outcome := outcome_of(status)) == FAILED:
-        return Verdict("failed", "Failed", status.removeprefix("failed: "))
-    text = f"{checked(summary)}."
-    if outcome == WARNED:
-        return Verdict("warning", "Done, with warnings", text)
-    return Verdict("passed", "Passed", text)
+        return "failed", "Failed", status.removeprefix("failed: ")
+    kind, word = ("warning", "Done, with warnings") if outcome == WARNED else ("passed", "Passed")
+    return kind, word, f"{checked(summary)}."
 
 
 def page_warnings(run: RunFolder) -> list[str]:
     """What a run warns of, the warnings of its log that are no check's, and the files that could
     not be read; each once.
     """
-    checks, status = run.summary["checks"], run.summary["status"]
-    found = warnings(checks, run.summary["results"])
+    summary = run.summary
+    found = tables.warnings(summary["checks"], summary["results"])
     for line in run.log:
-        level, where, text = line["level"], line["where"], line["text"]
-        known = text == status or (checks and where.startswith(_SOLVER))
-        if level in ("WARNING", "ERROR", "CRITICAL") and not known:
-            found.append(sentence(text, "") if where.startswith(_OURS) else f"{where}: {text}")
+        # faults of the solvers are among the checks
+        known = bool(summary["checks"]) and line["where"].startswith("upd.hbm")
+        known |= line["text"] == summary["status"]
+        if line["level"] in ("WARNING", "ERROR", "CRITICAL") and not known:
+            found.append(sentence(line["text"], ""))
     return list(dict.fromkeys([*found, *run.missing]))
 
 
@@ -156,3 +137,172 @@ def _bodies(run: RunFolder, stem: str) -> list[str]:
     if "glued" in stem:
         return [n for n in names if n not in ("left", "right")] or names
     return names
+
+
+# ---------------------------------------------------------------- several runs
+
+
+def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
+    """Write the page that compares the runs in ``folders`` to ``path``. Raises InputError."""
+    target = Path(path)
+    if len(folders) < 2:
+        raise InputError("a comparison needs two runs or more: give their folders")
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{target}: a comparison is a page; give a name that ends in .html")
+    runs = [read_run(Path(folder)) for folder in folders]
+    names = run_names(runs)
+    title = f"Comparison of {', '.join(names[:-1])} and {names[-1]}"
+    return write_page(target, page_text(title, comparison_sections(runs, names)))
+
+
+def run_names(runs: Sequence[RunFolder]) -> list[str]:
+    """Names of the run folders, from the folder that holds them all."""
+    paths = [run.path.resolve() for run in runs]
+    if len(set(paths)) < len(paths):
+        raise InputError("a folder is duplicated; to fix it: give each folder once")
+    common = os.path.commonpath(paths)
+    return [str(path.relative_to(common)) for path in paths]
+
+
+def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
+    """The page of several runs."""
+    charts = overlaid([tables.analysis_charts(run.arrays, run.summary) for run in runs], names)
+    differ = differences([run.summary["scene_file"] for run in runs])
+    results = [run.summary["results"] for run in runs]
+    main = {
+        (entry["name"], entry["case"])
+        for run in runs
+        for entry in tables.main_numbers(run.summary["size"], run.summary["results"])
+    }
+    first, others = numbers(results, names, main)
+    about = "Every run has one colour; points and lines are those of its own page."
+    heading = "In what the scenes differ"
+    table = AnswerTable(heading, ("entry", *names), differ)
+    return [
+        Section("Main numbers", [first], texts=[UNITS]),
+        Section("Runs", [_runs_table(runs, names)]),
+        Section(heading, [table], texts=["In nothing."] * (not differ)),
+        Section("Figures", charts=charts, texts=[about]),
+        Section("All other numbers", [others]),
+    ]
+
+
+def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
+    verdicts = [verdict(run.summary) for run in runs]
+    columns = {
+        "run": names,
+        "scene": [run.summary["title"] or run.summary["scene"] for run in runs],
+        "verdict": [f"{word}. {text}" for _, word, text in verdicts],
+        "# seconds": [f"{run.summary['cost']['total_s']:.1f}" for run in runs],
+    }
+    return tables.filled("Runs", columns)
+
+
+def numbers(
+    results: Sequence[Sequence[Entry]], names: Sequence[str], main: Container[tuple[str, str]]
+) -> tuple[AnswerTable, AnswerTable]:
+    """Numbers of all runs side by side, in the order of the first run that has them: the main ones
+    (name and case), and all others.
+    """
+    known = [{(r["name"], r["case"]): r for r in rows} for rows in results]
+    keys = list(dict.fromkeys(key for rows in known for key in rows))
+
+    def side_by_side(heading: str, mine: Sequence[tuple[str, str]]) -> AnswerTable:
+        found = [[rows.get(key) for rows in known] for key in mine]
+        given = [{(row["reference"], row["source"]) for row in rows if row} for rows in found]
+        # runs of other loads have another reference
+        references = [next(iter(one)) if len(one) == 1 else (None, "") for one in given]
+        columns = {
+            "number": [number_label(name) for name, _ in mine],
+            "case": [case for _, case in mine],
+            **{
+                f"# {name}": ["" if (row := rows[k]) is None else shown(row) for rows in found]
+                for k, name in enumerate(names)
+            },
+            f"# largest difference from {names[0]}": [percent(_spread(rows)) for rows in found],
+            "# reference": [number(value) for value, _ in references],
+            "source": [source if value is not None else "" for value, source in references],
+        }
+        return tables.filled(heading, columns)
+
+    return (
+        side_by_side("Main numbers", [key for key in keys if key in main]),
+        side_by_side("All other numbers", [key for key in keys if key not in main]),
+    )
+
+
+def _spread(rows: Sequence[Entry | None]) -> float | None:
+    """Largest difference from the first run, as a fraction."""
+    first, *others = [None if row is None else row["value"] for row in rows]
+    if not first or None in others:
+        return None
+    return float(max((value / first - 1.0 for value in others), key=abs))
+
+
+def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:
+    """The same chart of every run in one, a colour per run.
+
+    Maps, which cannot lie on each other, become cases of one place, with one colour scale.
+    """
+    alike: dict[tuple[str, str], list[tuple[int, Chart]]] = {}
+    for k, mine in enumerate(runs):
+        for c in mine:
+            alike.setdefault((c.title, c.case), []).append((k, c))
+    out: list[Chart] = []
+    for group in alike.values():
+        charts = [c for _, c in group]
+        low, top = colour_range([m for c in charts for m in c.maps if not m.states])
+        least, most = colour_range([s for c in charts for s in c.scatters])
+        # another cannot lie on what fills its place
+        if not any(c.maps or c.scatters or any(area.state for area in c.areas) for c in charts):
+            out.append(_together(group, names))
+            continue
+        for k, c in group:
+            maps = tuple(m if m.states else replace(m, low=low, top=top) for m in c.maps)
+            dots = tuple(replace(s, axis=replace(s.axis, low=least, high=most)) for s in c.scatters)
+            one = replace(c, title=f"{c.title}: {names[k]}", heading=c.title, figure=c.title)
+            out.append(replace(one, maps=maps, scatters=dots))
+    return out
+
+
+def _together(group: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
+    """Charts of several runs as one.
+
+    Every run has one colour, its curves, marks and areas share it; limits are drawn once.
+    """
+    first = group[0][1]
+
+    def axis(name: str) -> Axis:
+        one, *others = (getattr(c, name) for _, c in group)
+        same: Axis = (
+            one if all(other == one for other in others) else replace(one, low=None, high=None)
+        )
+        return same
+
+    return replace(
+        first,
+        figure=first.title,
+        x=axis("x"),
+        y=axis("y"),
+        detail="",
+        traces=tuple(
+            replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False)
+            for k, c in group
+            for t in c.traces
+        ),
+        marks=tuple(replace(m, colour=k, closed=False) for k, c in group for m in c.marks),
+        areas=tuple(
+            replace(a, label=f"{names[k]}: {a.label}", colour=k) for k, c in group for a in c.areas
+        ),
+        bands=tuple(dict.fromkeys(band for _, c in group for band in c.bands)),
+    )
+
+
+def differences(scenes: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, ...], ...]:
+    """Entries of the scene files that are not the same in all runs: path and the value of every
+    run.
+    """
+    flat = [{path: str(value) for path, value in leaves("", scene)} for scene in scenes]
+    paths = dict.fromkeys(path for entries in flat for path in entries)
+    rows = ((path, *(entries.get(path, "–") for entries in flat)) for path in paths)
+    return tuple(row for row in rows if len(set(row[1:])) > 1)

@@ -5,24 +5,12 @@ its charts: the terminal, the page and the notebook draw the same.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
+from upd import labels
 from upd.analyses import analysis_named
 from upd.analyses.base import Effect
-from upd.labels import (
-    check_number,
-    check_words,
-    listed,
-    number,
-    percent,
-    percent_of,
-    plus_minus,
-    sentence,
-    shown,
-    unit_label,
-)
 from upd.plot.chart import Chart, Entry
 from upd.results import Arrays, ErrorPart
 from upd.results.answer_table import AnswerTable
@@ -37,8 +25,6 @@ _MOST = 8
 _CASES = 8
 #: heading of numbers that belong to no case
 _WHOLE = "whole run"
-#: heading of the main numbers
-MAIN = "Main numbers"
 #: notes beside an answer; what matters less is folded, or counted
 MOST_NOTES = 3
 
@@ -79,42 +65,34 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     own = analysis.answer(entries) if analysis and analysis.answer else []
     if any(table.rows for table in own):
         return [table for table in own if table.rows]
-    cases = _alike(entries, analysis.headline_names if analysis else ())
-    main = reached_numbers(size, entries)
-    tables = [number_table(MAIN, main)] if main else []
-    tables += [_case_table(rows) for rows in cases]
-    note = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])
+    main = [entry for entry in main_numbers(size, entries) if not entry.get("withheld")]
     order = [entry["value"] for entry in entries if entry["name"] == CLOSED_FORM_ERROR.name]
-    if main and order:
-        exact = percent_of(max(order) / 100)
-        note = f"The closed forms are exact to the order (a/R)² = {exact}. {note}"
-    if not (tables and note):
-        return tables
-    first, *others = tables
-    return [replace(first, note=f"{first.note} {note}".strip()), *others]
+    names = {entry["name"] for entry in main}
+    note = _not_estimated(entry for entry in entries if entry["name"] in names)
+    if order:
+        exact = labels.percent_of(max(order) / 100)
+        note = f"The closed forms are exact to the order (a/R)² = {exact}. {note}".rstrip()
+    cases = _case_tables(entries, analysis.headline_names if analysis else ())
+    return [
+        table for table in (number_table("Main numbers", main, note=note), *cases) if table.rows
+    ]
 
 
-def _not_estimated(entries: Sequence[Entry]) -> str:
-    """Why numbers have no estimate of their error: in one sentence if none has one."""
+def _not_estimated(entries: Iterable[Entry]) -> str:
+    """Why numbers have no estimate of their error."""
     reasons: dict[str, list[str]] = {}
     for entry in entries:
         lost = [p["basis"] for p in entry.get("error_parts", ()) if p["error"] is None]
-        if lost:
-            why = lost[0].removeprefix("not estimated: ").rstrip(".")
+        for basis in lost[:1]:
+            why = basis.removeprefix("not estimated: ").rstrip(".")
             reasons.setdefault(why, []).append(number_label(entry["name"]))
-    if len(reasons) == 1 and not any(map(plus_minus, entries)):
-        return f"Errors are not estimated: {next(iter(reasons))}."
-    return " ".join(
-        f"{', '.join(dict.fromkeys(names))} without ±: {why}." for why, names in reasons.items()
-    )
+    without = (f"{labels.listed(names, None)} without ±: {why}." for why, names in reasons.items())
+    return " ".join(without)
 
 
-def reached_numbers(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Entry]:
-    """The main numbers without those that were not reached."""
-    return [entry for entry in main_numbers(size, entries) if not entry.get("withheld")]
-
-
-def number_table(heading: str, entries: Iterable[Entry], case: str = "") -> AnswerTable:
+def number_table(
+    heading: str, entries: Iterable[Entry], case: str = "", note: str = ""
+) -> AnswerTable:
     """A row for every number; above those of another case than ``case``, a row with its label."""
     rows: list[tuple[str, Entry | None]] = []
     for entry in entries:
@@ -130,53 +108,51 @@ def number_table(heading: str, entries: Iterable[Entry], case: str = "") -> Answ
         heading,
         {
             "number": [name for name, _ in rows],
-            "# value": column(shown),
-            "# ±": column(lambda e: plus_minus(e).lstrip("±")),
-            "# reference": column(lambda e: number(e["reference"])),
-            "# difference": column(lambda e: percent(e.get("error"))),
-            "# thesis": column(lambda e: percent(e.get("thesis_error"))),
+            "# value": column(labels.shown),
+            "# ±": column(lambda e: labels.plus_minus(e).lstrip("±")),
+            "# reference": column(lambda e: labels.number(e["reference"])),
+            "# difference": column(lambda e: labels.percent(e.get("error"))),
+            "# thesis": column(lambda e: labels.percent(e.get("thesis_error"))),
             "source": column(lambda e: e.get("source", "")),
         },
+        note,
     )
 
 
-def all_numbers(entries: Iterable[Entry]) -> list[AnswerTable]:
+def all_numbers(entries: Sequence[Entry]) -> list[AnswerTable]:
     """All numbers, a table for every case."""
-    cases: dict[str, list[Entry]] = {}
-    for entry in entries:
-        cases.setdefault(str(entry["case"]), []).append(entry)
-    return [number_table(case or _WHOLE, rows, case) for case, rows in cases.items()]
+    return [
+        number_table(case or _WHOLE, [e for e in entries if e["case"] == case], case)
+        for case in dict.fromkeys(entry["case"] for entry in entries)
+    ]
 
 
-def _alike(entries: Sequence[Entry], patterns: Sequence[str]) -> list[list[list[Entry]]]:
-    """Cases that have the same of the numbers that matter, a row of numbers each; most numbers
-    first.
-    """
+def _case_tables(entries: Sequence[Entry], patterns: Sequence[str]) -> list[AnswerTable]:
+    """A table for all cases that have the same of the numbers that matter; most numbers first."""
     cases: dict[str, dict[str, Entry]] = {}
-    for entry in entries:
-        if any(fnmatchcase(entry["name"], one) for one in patterns):
-            cases.setdefault(entry["case"], {}).setdefault(entry["name"], entry)
-
-    def rank(name: str) -> int:
-        return next(k for k, one in enumerate(patterns) if fnmatchcase(name, one))
-
+    for one in patterns:
+        for entry in entries:
+            if fnmatchcase(entry["name"], one):
+                cases.setdefault(entry["case"], {}).setdefault(entry["name"], entry)
     alike: dict[tuple[str, ...], list[list[Entry]]] = {}
     for mine in cases.values():
-        order = tuple(sorted(mine, key=rank))
-        alike.setdefault(order, []).append([mine[name] for name in order])
-    several = [(names, rows) for names, rows in alike.items() if len(rows) > 1]
-    return [rows for _, rows in sorted(several, key=lambda table: -len(table[0]))]
+        alike.setdefault(tuple(mine), []).append(list(mine.values()))
+    several = [rows for rows in alike.values() if len(rows) > 1]
+    return [_case_table(rows) for rows in sorted(several, key=lambda rows: -len(rows[0]))]
 
 
 def _case_table(cases: Sequence[Sequence[Entry]]) -> AnswerTable:
     """A row for each of the first cases, a column for every number."""
-    shown_cases = cases[: _CASES - (len(cases) > _CASES)]
-    columns = {"case": [row[0]["case"] for row in shown_cases]}
-    for k, entry in enumerate(cases[0]):
-        columns[f"# {with_unit(number_label(entry['name']), entry['unit'])}"] = [
-            f"{shown(row[k], unit=False)} {plus_minus(row[k])}".rstrip() for row in shown_cases
-        ]
-    more = len(cases) - len(shown_cases)
+    kept = cases[: _CASES - (len(cases) > _CASES)]
+    more = len(cases) - len(kept)
+
+    def cell(entry: Entry) -> str:
+        return f"{labels.shown(entry, unit=False)} {labels.plus_minus(entry)}".rstrip()
+
+    columns = {"case": [row[0]["case"] for row in kept]} | {
+        f"# {with_unit(number_label(one['name']), one['unit'])}": [cell(row[k]) for row in kept]
+        for k, one in enumerate(cases[0])
+    }
     return filled("By case", columns, f"{more} more cases: see all numbers." if more else "")
 
 
@@ -191,50 +167,36 @@ def effects_table(effects: Sequence[Mapping[str, Any]]) -> AnswerTable:
     return filled("What was simulated", columns)
 
 
-def checks_table(checks: Iterable[Mapping[str, Any]]) -> AnswerTable:
+def checks_table(checks: Sequence[Mapping[str, Any]]) -> AnswerTable:
     """The worst case of every self-check."""
     worst = worst_checks(checks)
     columns = {
         "self-check": [f"{c['name']}: {c['says']}" for c in worst],
         "worst case": [c["case"] for c in worst],
-        "# value": [check_number(c, "value") for c in worst],
-        "# limit": [check_number(c, "limit") for c in worst],
+        "# value": [labels.check_number(c, "value") for c in worst],
+        "# limit": [labels.check_number(c, "limit") for c in worst],
         "verdict": [c["verdict"] for c in worst],
     }
     return filled("Self-checks", columns)
 
 
-def error_parts(entry: Entry) -> list[tuple[str, float | None, float | None, str, str]]:
+def error_parts(entry: Entry) -> list[tuple[str, float | None, str, str]]:
     """Sources of a number's error and its uncertain inputs, each with those not found first and
-    then the largest: name, error, share of the sum of all errors, seconds that half of it costs,
-    how it was estimated.
+    then the largest: name, error, seconds that half of it costs, how it was estimated.
     """
-    total = entry.get("estimated_error")
     errors = [
-        (
-            part["source"],
-            part["error"],
-            part["error"] / total if total and part["error"] is not None else None,
-            from_json(ErrorPart, part).half_words,
-            part["basis"],
-        )
+        (part["source"], part["error"], from_json(ErrorPart, part).half_words, part["basis"])
         for part in entry.get("error_parts", ())
     ]
     inputs = [
-        (f"input {part['path']}", part["share"], None, "", part["basis"])
+        (f"input {part['path']}", part["share"], "", part["basis"])
         for part in entry.get("input_parts", ())
     ]
 
-    def size(part: tuple[str, float | None, float | None, str, str]) -> float:
+    def size(part: tuple[str, float | None, str, str]) -> float:
         return float("-inf") if part[1] is None else -part[1]
 
     return sorted(errors, key=size) + sorted(inputs, key=size)
-
-
-def inputs_exceed(entry: Entry) -> bool:
-    """Whether a number is known better than its inputs let it be."""
-    band, error = entry.get("input_error"), entry.get("estimated_error")
-    return band is not None and error is not None and band > error
 
 
 def budget_table(entries: Sequence[Entry]) -> AnswerTable:
@@ -243,11 +205,10 @@ def budget_table(entries: Sequence[Entry]) -> AnswerTable:
     columns = {
         "number": [number_label(entry["name"]) for entry, *_ in rows],
         "case": [entry["case"] for entry, *_ in rows],
-        "source": [row[1] for row in rows],
-        "# error": [percent_of(row[2]) for row in rows],
-        "# share": ["" if row[3] is None else f"{100.0 * row[3]:.0f} %" for row in rows],
-        "# half of it costs": [row[4] for row in rows],
-        "how it was estimated": [row[5] for row in rows],
+        "source": [source for _, source, *_ in rows],
+        "# error": [labels.percent_of(error) for _, _, error, *_ in rows],
+        "# half of it costs": [half for *_, half, _ in rows],
+        "how it was estimated": [basis for *_, basis in rows],
     }
     note = (
         "The errors of all sources are added: their signs are not known. Independent inputs add as "
@@ -269,34 +230,30 @@ def stage_table(seconds: Mapping[str, float]) -> AnswerTable:
 
 def with_unit(title: str, unit: str) -> str:
     """A title with the unit of its numbers."""
-    return f"{title}, {unit_label(unit)}" if unit else title
+    return f"{title}, {labels.unit_label(unit)}" if unit else title
 
 
 def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
     """Every number with its first-order band and the sampled one."""
 
-    def band(value: float | None) -> str:
-        return "" if value is None else f"±{percent_of(value)}"
+    def band(*values: float | None) -> str:
+        return " to ".join(f"±{labels.percent_of(value)}" for value in values if value is not None)
 
-    def ends(*values: float | None, text: Callable[[float], str] = number) -> str:
-        return " to ".join(text(value) for value in values if value is not None)
+    def ends(*values: float | None) -> str:
+        return " to ".join(labels.number(value) for value in values if value is not None)
 
     middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
     columns = {
         "number": [with_unit(number_title(n.name, n.case), n.unit) for n in numbers],
-        "# as given": [number(n.nominal) for n in numbers],
+        "# as given": [labels.number(n.nominal) for n in numbers],
         "# first order": [band(n.first_order) for n in numbers],
         "# sample": [band(n.band) for n in numbers],
-        "# 95 % interval of the sample's band": [
-            ends(n.band_low, n.band_high, text=percent_of) for n in numbers
-        ],
-        "# mean": [number(n.mean) for n in numbers],
-        "# standard deviation": [number(n.deviation) for n in numbers],
+        "# 95 % interval of the sample's band": [band(n.band_low, n.band_high) for n in numbers],
         f"# {middle}": [ends(n.low, n.high) for n in numbers],
         "# points": [str(n.count) for n in numbers],
         "compared": [n.verdict for n in numbers],
     }
-    note = sample_sentence(numbers) + " sample.csv has all digits."
+    note = sample_sentence(numbers) + " sample.csv has all digits, means and deviations."
     return filled("Bands by the inputs, to first order and sampled", columns, note)
 
 
@@ -315,24 +272,19 @@ def warnings(
     most
         Cases and numbers that are named in each; all of them when None.
     """
-    failed: dict[str, list[Mapping[str, Any]]] = {}
-    for check in checks:
-        if check["verdict"] != "passed":
-            failed.setdefault(check["name"], []).append(check)
-    lost: dict[str, list[Entry]] = {}
-    for entry in results:
-        if entry.get("withheld"):
-            lost.setdefault(entry["withheld"], []).append(entry)
-    out = []
-    for name, mine in failed.items():
+    out, failed = [], [check for check in checks if check["verdict"] != "passed"]
+    for name in dict.fromkeys(check["name"] for check in failed):
+        mine = [check for check in failed if check["name"] == name]
         worst = worst_check(mine)
-        cases = listed([worst["case"], *(c["case"] for c in mine)], most, " ({})")
-        remedy = f". {sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
-        out.append(sentence(f"{name}{cases}: {check_words(worst)}{remedy}"))
-    for reason, numbers in lost.items():
-        names = listed([number_label(entry["name"]) for entry in numbers], most)
-        cases = listed([entry["case"] for entry in numbers], most, " ({})")
-        out.append(sentence(f"{names}{cases}: not reached, {reason}"))
+        cases = labels.listed([worst["case"], *(c["case"] for c in mine)], most, " ({})")
+        remedy = f". {labels.sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
+        out.append(labels.sentence(f"{name}{cases}: {labels.check_words(worst)}{remedy}"))
+    lost = [entry for entry in results if entry.get("withheld")]
+    for reason in dict.fromkeys(entry["withheld"] for entry in lost):
+        numbers = [entry for entry in lost if entry["withheld"] == reason]
+        names = labels.listed([number_label(entry["name"]) for entry in numbers], most)
+        cases = labels.listed([entry["case"] for entry in numbers], most, " ({})")
+        out.append(labels.sentence(f"{names}{cases}: not reached, {reason}"))
     return out
 
 

@@ -3,79 +3,85 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 
-@dataclass(frozen=True, eq=False)
+def _written(form: str, default: Any = "") -> Any:
+    """An attribute and how the label shows it."""
+    return field(default=default, metadata={"form": form})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Case:
     """What a number, a check or a group of arrays belongs to.
 
     Only what applies is given; the label is derived, never parsed.
 
-    A case equals its label, so that scripts may write it: ``row.case == "F=50 N"``.
+    A case equals its label, so that scripts may write it: ``row.case == "F=50 N"``. Attributes
+    stand in the label's order.
 
     Attributes
     ----------
-    name
-        Words for a case that no number identifies: "Craig-Bampton", "equilibrium", "performance".
     stiffness
         Name of the contact stiffness, a table of the scene.
-    body
-        A body of the model.
     load
         Normal force, N.
     direction
         Direction of a tangential load: "x", "y" or "45deg".
     ratio
         Tangential load over mu times the normal load.
-    friction
-        State of the damper's equilibrium: "opposing", "frictionless", "reversed".
-    force_ratio
-        F_C/F_E, centrifugal over excitation force.
     kind
         Kind of linear curve or of modes: "free", "stuck", "glued".
+    blade
+        Blade whose motion it is: "left", "right".
+    name
+        Words for a case that no number identifies: "Craig-Bampton", "equilibrium", "performance".
+    friction
+        State of the damper's equilibrium: "opposing", "frictionless", "reversed".
     arrangement
         Which sides of the platforms face each other: "symmetric", "asymmetric".
+    body
+        A body of the model.
+    force_ratio
+        F_C/F_E, centrifugal over excitation force.
     peak
         Number of the peak from 1; 0 is the highest point of a curve without a peak.
     mode
         How the blades move at a peak: "in phase", "out of phase".
-    frequency
-        Hz.
-    part
-        Share of the first natural frequency.
-    blade
-        Blade whose motion it is: "left", "right".
-    side
-        Face: "left", "right".
     choice
         What was chosen differently: "start mid", "3 harmonics".
-    nodal_diameter
-        Of the modes of a bladed disk.
+    part
+        Share of the first natural frequency.
+    frequency
+        Hz.
+    side
+        Face: "left", "right".
     engine_order
         That excites them.
+    nodal_diameter
+        Of the modes of a bladed disk.
     """
 
-    name: str = ""
-    stiffness: str = ""
-    body: str = ""
-    load: float | None = None
-    direction: str = ""
-    ratio: float | None = None
-    friction: str = ""
-    force_ratio: float | None = None
-    kind: str = ""
-    arrangement: str = ""
-    peak: int | None = None
-    mode: str = ""
-    frequency: float | None = None
-    part: float | None = None
-    blade: str = ""
-    side: str = ""
-    choice: str = ""
-    nodal_diameter: int | None = None
-    engine_order: int | None = None
+    stiffness: str = _written("{}")
+    load: float | None = _written("F={} N", None)
+    direction: str = _written("_{}")
+    ratio: float | None = _written("/muN={}", None)
+    kind: str = _written("{}")
+    blade: str = _written("{} blade")
+    name: str = _written("{}")
+    friction: str = _written("friction {}")
+    arrangement: str = _written("{}")
+    body: str = _written("{}")
+    force_ratio: float | None = _written("F_C/F_E {}", None)
+    peak: int | None = _written("at peak {}", None)
+    mode: str = _written("{}")
+    choice: str = _written("{}")
+    part: float | None = _written("{} f1", None)
+    frequency: float | None = _written("{} Hz", None)
+    side: str = _written("{}")
+    engine_order: int | None = _written("EO {}", None)
+    nodal_diameter: int | None = _written("ND {}", None)
 
     @property
     def label(self) -> str:
@@ -84,37 +90,18 @@ class Case:
 
     def _label(self, varying: frozenset[str]) -> str:
         """The label with * for the values of ``varying`` attributes."""
-
-        def shown(name: str, form: str = "{}") -> str:
-            """An attribute in words; nothing where it does not apply."""
-            value = getattr(self, name)
-            if value is None or value == "":
-                return ""
+        words = dict[str, str]()
+        for one in fields(self):
+            value = getattr(self, one.name)
             number = f"{value:.6g}" if isinstance(value, float) else str(value)
-            return form.format("*" if name in varying else number)
-
-        load = shown("load", "F={} N")
-        shear = shown("direction", "_{}") + shown("ratio", "/muN={}")
-        parts = [
-            shown("stiffness"),
-            f"{load} T{shear}" if load and shear else load,
-            shown("kind"),
-            shown("blade", "{} blade"),
-            shown("name"),
-            shown("friction", "friction {}"),
-            shown("arrangement"),
-            shown("body"),
-            shown("force_ratio", "F_C/F_E {}"),
-            "at the highest point" if self.peak == 0 else shown("peak", "at peak {}"),
-            shown("mode"),
-            shown("choice"),
-            shown("part", "{} f1"),
-            shown("frequency", "{} Hz"),
-            shown("side"),
-            shown("engine_order", "EO {}"),
-            shown("nodal_diameter", "ND {}"),
-        ]
-        return ", ".join(part for part in parts if part)
+            text = one.metadata["form"].format("*" if one.name in varying else number)
+            words[one.name] = "" if value in (None, "") else text
+        if self.peak == 0:
+            words["peak"] = "at the highest point"
+        shear = words.pop("direction") + words.pop("ratio")
+        if words["load"] and shear:
+            words["load"] += f" T{shear}"
+        return ", ".join(filter(None, words.values()))
 
     def matches(self, other: Case | str) -> bool:
         """Whether ``other`` means this case: itself or its label, with or without the mode."""

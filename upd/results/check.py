@@ -9,7 +9,7 @@ from typing import Any
 
 from upd.labels import check_words, listed
 from upd.results.case import Case
-from upd.results.number import Result, as_json
+from upd.results.number import Result, as_json, from_json
 from upd.results.quantities import number_label
 
 OK, WARNED, FAILED = "ok", "ok with warnings", "failed"
@@ -31,20 +31,11 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     missing = [r for r in results if r.withheld]
     if missing and len(missing) == len(results):
         return f"{FAILED}: no number was reached; {missing[0].withheld}"
-    warnings = warnings_of(checks, results)
-    return f"{WARNED}: " + "; ".join(warnings) if warnings else OK
-
-
-def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
-    """What did not pass and what was not reached, one sentence per name with its cases."""
-    found: dict[str, list[str]] = {}
-    for check in checks:
-        if not check.passed:
-            found.setdefault(check.name, []).append(check.case.label)
-    for one in results:
-        if one.withheld:
-            found.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
-    return [name + listed(cases, 2, " ({})") for name, cases in found.items()]
+    found = [(c.name, c.case.label) for c in checks if not c.passed]
+    found += [(f"{number_label(r.name)} not reached", r.case.label) for r in missing]
+    cases = {name: [case for one, case in found if one == name] for name, _ in found}
+    warnings = [name + listed(mine, 2, " ({})") for name, mine in cases.items()]
+    return f"{WARNED}: {'; '.join(warnings)}" if warnings else OK
 
 
 def outcome_of(status: str) -> str:
@@ -101,6 +92,11 @@ class Check:
         return f"{self.name}{case}: {check_words(self.as_dict())}; {self.remedy}"
 
 
+def read_check(data: Mapping[str, Any]) -> Check:
+    """The check that `Check.as_dict` wrote."""
+    return from_json(Check, data, case=from_json(Case, data["case_fields"]))
+
+
 _RANK = {"passed": 0, "warning": 1, "failed": 2}
 
 
@@ -117,9 +113,7 @@ def worst_check(checks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any]:
     return max(checks, key=badness)
 
 
-def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def worst_checks(checks: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """One check per name, in the order of the names: the worst of its cases."""
-    found: dict[str, list[Mapping[str, Any]]] = {}
-    for check in checks:
-        found.setdefault(check["name"], []).append(check)
-    return [worst_check(mine) for mine in found.values()]
+    names = dict.fromkeys(check["name"] for check in checks)
+    return [worst_check(check for check in checks if check["name"] == name) for name in names]

@@ -41,18 +41,10 @@ class Group(dict[str, Variable]):
     """
 
     def __init__(
-        self,
-        variables: Mapping[str, tuple[Any, ...]] | None = None,
-        /,
-        *,
-        content: str = "",
-        case: Case = NO_CASE,
-        **attributes: Any,
+        self, variables: Mapping[str, tuple[Any, ...]], /, case: Case = NO_CASE, **attributes: Any
     ) -> None:
-        super().__init__({name: Variable(*one) for name, one in (variables or {}).items()})
-        self.attributes: dict[str, Any] = (
-            ({"content": content} if content else {}) | case.given() | attributes
-        )
+        super().__init__({name: Variable(*one) for name, one in variables.items()})
+        self.attributes: dict[str, Any] = case.given() | attributes
 
 
 Arrays = Mapping[str, Group]

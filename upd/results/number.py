@@ -204,23 +204,18 @@ def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, .
 
 def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
     """The number with the parts of its error: their sum bounds it whatever their signs."""
-    mine = tuple(parts)
-    if not mine or result.withheld:
-        return result
-    known = all(part.known for part in mine)
-    return replace(
-        result,
-        parts=mine,
-        estimated_error=math.fsum(part.error for part in mine) if known else None,
-    )
+    mine = () if result.withheld else tuple(parts)
+    known = bool(mine) and all(part.known for part in mine)
+    total = math.fsum(part.error for part in mine) if known else None
+    return replace(result, parts=mine, estimated_error=total) if mine else result
 
 
-def read_result(data: Mapping[str, Any], case: Case | None = None) -> Result:
-    """The number that `Result.as_dict` wrote, of the case that its fields give where none is."""
+def read_result(data: Mapping[str, Any]) -> Result:
+    """The number that `Result.as_dict` wrote."""
     return from_json(
         Result,
         data,
-        case=Case(**data["case_fields"]) if case is None else case,
+        case=from_json(Case, data["case_fields"]),
         printed_error=data.get("thesis_error"),
         parts=tuple(from_json(ErrorPart, one) for one in data.get("error_parts", ())),
         inputs=tuple(from_json(InputPart, one) for one in data.get("input_parts", ())),

@@ -40,8 +40,6 @@ class Quantity:
         Whether it converges on the bodies there are, not to a closed form of half-spaces.
     is_error
         Whether it is an error itself and has none.
-    source
-        Where it comes from, of one that has no reference.
     in_percent
         Whether its values are given in %, not as parts of one.
     part_of
@@ -54,7 +52,6 @@ class Quantity:
     full: str = ""
     same_bodies: bool = False
     is_error: bool = False
-    source: str = ""
     in_percent: bool = False
     part_of: str = ""
 
@@ -76,7 +73,7 @@ class Quantity:
         """The number of a case, with a reference and its source; both values in mm, N, t, rad."""
         if reference is not None:
             reference *= self.scale
-        value, source = self.scale * float(value), source or self.source
+        value = self.scale * float(value)
         return Result(self.named(n), case, value, self.unit, reference, source, **more)
 
     def withheld(self, case: Case, reason: str, *, n: object = "") -> Result:
@@ -114,19 +111,8 @@ MAX_PRESSURE = Quantity("max_pressure", "MPa", "maximum pressure")
 MEAN_PRESSURE = Quantity("mean_pressure", "MPa", "mean pressure")
 CONTACT_AREA = Quantity("contact_area", "mm2")
 CONTACT_AREA_NODES = Quantity("contact_area_nodes", "mm2", "area, node count")
-CONTACT_AREA_RESOLUTION = Quantity(
-    "contact_area_resolution",
-    "mm2",
-    "contact area known to +-",
-    source="half the area of the cells that the edge crosses",
-)
-STICK_AREA = Quantity(
-    "stick_area",
-    "mm2",
-    "area in stick",
-    source="tributary areas of the nodes that stick",
-    part_of="contact area",
-)
+CONTACT_AREA_RESOLUTION = Quantity("contact_area_resolution", "mm2", "contact area known to +-")
+STICK_AREA = Quantity("stick_area", "mm2", "area in stick", part_of="contact area")
 CLOSED_SHARE = Quantity("closed_share", "%", "share of the patch in contact", in_percent=True)
 APPROACH = Quantity("approach", "um", "approach, raw", full="approach_contact", same_bodies=True)
 CYCLE_ENERGY = Quantity("cycle_energy", "mJ", "energy per cycle")
@@ -141,12 +127,7 @@ RADIUS_MOMENT = Quantity("radius_moment", "um", "radius, second moment")
 RADIUS_AREA = Quantity("radius_area", "um", "radius, node count")
 RADIUS_OUTERMOST = Quantity("radius_outermost", "um", "radius, outermost node")
 APPROACH_CONTACT = Quantity("approach_contact", "um", "approach, bulk compliance removed")
-APPROACH_FINITE_BODY = Quantity(
-    "approach_finite_body",
-    "um",
-    "finite bodies in the approach",
-    source="solved for, without the mesh's error",
-)
+APPROACH_FINITE_BODY = Quantity("approach_finite_body", "um", "finite bodies in the approach")
 APPROACH_WITHIN_3A = Quantity("approach_within_3a", "um", "approach within 3a (thesis 6.5)")
 COMPRESSION_3A = Quantity("compression_3a_{n}", "um", "{n} beyond 3a")
 K_N_TANGENT = Quantity("K_N_tangent", "N/mm", "K_N tangent, bulk compliance removed")
@@ -156,9 +137,7 @@ K_T_INITIAL_RAW = Quantity("K_T_initial_raw", "N/mm", "K_T initial, raw")
 K_T_INITIAL = Quantity("K_T_initial", "N/mm", "K_T initial, bulk compliance removed")
 K_T_OVER_K_N = Quantity("K_T_over_K_N", words="K_T / K_N")
 #: what a paraboloid on a half-space lacks of a sphere, to the order
-CLOSED_FORM_ERROR = Quantity(
-    "closed_form_error", "%", "order of Hertz's own error, (a/R)²", is_error=True
-)
+CLOSED_FORM_ERROR = Quantity("closed_form_error", "%", "order (a/R)² of Hertz", is_error=True)
 STICK_RADIUS = Quantity("stick_radius", "um", "stick radius")
 SHEAR_RAW = Quantity("tangential_displacement_raw", "um", "displacement, raw")
 SHEAR = Quantity("tangential_displacement", "um", "displacement, bulk compliance removed")
@@ -307,13 +286,9 @@ FORCE_FOR_DAMPING = Quantity("force_for_damping", "N/(m/s2)", "F_C per amplitude
 
 FRAC = Quantity("frac", words="FRAC with the measured curve")
 MAGNITUDE_CORRELATION = Quantity("magnitude_correlation", words="correlation of magnitudes")
-COMPUTED_FREQUENCY = Quantity("computed_peak_frequency", "Hz", "computed peak, frequency")
-COMPUTED_ACCELERANCE = Quantity(
-    "computed_peak_accelerance", "(m/s2)/N", "computed peak, accelerance"
-)
-FREQUENCY_DIFFERENCE = Quantity(
-    "peak_frequency_difference", "Hz", "computed less measured peak, frequency", is_error=True
-)
+COMPUTED_FREQUENCY = Quantity("computed_peak_frequency", "Hz", "computed peak frequency")
+COMPUTED_ACCELERANCE = Quantity("computed_peak_accelerance", "(m/s2)/N", "computed accelerance")
+FREQUENCY_DIFFERENCE = Quantity("peak_frequency_difference", "Hz", "less measured", is_error=True)
 HALF_POWER_DAMPING = Quantity("half_power_damping", "%", "damping ratio by half power")
 FITTED_DAMPING = Quantity("fitted_damping", "%", "damping ratio fitted to the measured curve")
 FITTED_FREQUENCY = Quantity("fitted_frequency", "Hz", "natural frequency fitted to the curve")

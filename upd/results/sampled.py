@@ -69,11 +69,6 @@ class SampledNumber:
         sqrt(3) deviations.
     band_low, band_high
         Ends of its 95 % interval by the sampling error; None where there is none.
-    shift
-        Mean of what the first order leaves, relative to the nominal number; None where that is
-        not known.
-    shift_error
-        Half of its 95 % interval.
     outcome
         "agrees", "differs" or "unknown".
     verdict
@@ -86,15 +81,13 @@ class SampledNumber:
     nominal: float | None
     first_order: float | None
     count: int
-    mean: float | None
-    deviation: float | None
-    low: float | None
-    high: float | None
+    mean: float | None = None
+    deviation: float | None = None
+    low: float | None = None
+    high: float | None = None
     band: float | None = None
     band_low: float | None = None
     band_high: float | None = None
-    shift: float | None = None
-    shift_error: float | None = None
     outcome: str = UNKNOWN_BAND
     verdict: str = ""
 
@@ -128,46 +121,44 @@ def sampled_number(
     """
     known = np.isfinite(values)
     drawn, nominal = values[1:][known[1:]], float(values[0]) if known[0] else None
-    why = _unknown(inputs, paths)
-    changes = {part.path: part.change for part in inputs}
-    mean, deviation, low, high = _moments(drawn)
-    found = SampledNumber(name, case, unit, nominal, None, len(drawn), mean, deviation, low, high)
-    if nominal is None:
-        found = replace(found, verdict="no number with the inputs at their values")
-    elif nominal == 0.0:
-        found = replace(found, verdict="the number is 0: nothing is relative to it")
-    elif deviation is None:
-        found = replace(found, verdict="too few points have it for a standard deviation")
-    else:
-        found = replace(found, band=LIMITS * deviation / abs(nominal), verdict=why)
-        if not why:
-            c = np.array([changes[path] for path in paths])
-            predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
-            found = replace(found, first_order=float(np.linalg.norm(c)))
-            found = _compared(found, drawn, predicted, nominal)
+    found = _with_moments(SampledNumber(name, case, unit, nominal, None, len(drawn)), drawn)
+    why = _unknown(found, inputs, paths)
+    if nominal and found.deviation is not None:
+        found = replace(found, band=LIMITS * found.deviation / abs(nominal))
+    if nominal and not why:
+        changes = {part.path: part.change for part in inputs}
+        c = np.array([changes[path] for path in paths])
+        predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
+        found = replace(found, first_order=float(np.linalg.norm(c)))
+        found = _compared(found, drawn, predicted, nominal)
     missing = len(values) - 1 - len(drawn)
     lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
-    return replace(found, verdict=found.verdict + lost)
+    return replace(found, verdict=(why or found.verdict) + lost)
 
 
-def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
-    """Why there is no first-order band, "" where there is one."""
+def _unknown(number: SampledNumber, inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
+    """Why its sample is not compared with a first-order band, "" where it is."""
     found = {part.path: part for part in inputs}
-    if not found:
-        return "no first-order band: it is none of the run's main numbers"
     lost = [f"{p}: {found[p].basis}" for p in paths if p in found and not found[p].known]
     lost += [f"{path}: not found" for path in paths if path not in found]
-    return f"no first-order band ({'; '.join(lost)})" if lost else ""
+    reasons = {
+        "no number with the inputs at their values": number.nominal is None,
+        "the number is 0: nothing is relative to it": number.nominal == 0.0,
+        "too few points have it for a standard deviation": number.deviation is None,
+        "no first-order band: it is none of the run's main numbers": not found,
+        f"no first-order band ({'; '.join(lost)})": bool(lost),
+    }
+    return next((why for why, holds in reasons.items() if holds), "")
 
 
-def _moments(drawn: Array) -> list[float | None]:
-    """Mean, deviation and both ends of the sample."""
-    if not len(drawn):
-        return [None] * 4
-    resolved = TAIL * len(drawn) >= 1.0
-    low, high = np.quantile(drawn, (TAIL, 1.0 - TAIL) if resolved else (0.0, 1.0))
-    deviation = float(np.std(drawn, ddof=1)) if len(drawn) > 2 else None
-    return [float(drawn.mean()), deviation, float(low), float(high)]
+def _with_moments(number: SampledNumber, drawn: Array) -> SampledNumber:
+    """A number with mean, deviation and both ends of its sample."""
+    if not number.count:
+        return number
+    low, high = np.quantile(drawn, (TAIL, 1.0 - TAIL) if number.resolved else (0.0, 1.0))
+    deviation = float(np.std(drawn, ddof=1)) if number.count > 2 else None
+    mean = float(drawn.mean())
+    return replace(number, mean=mean, deviation=deviation, low=float(low), high=float(high))
 
 
 def _compared(found: SampledNumber, drawn: Array, first: Array, nominal: float) -> SampledNumber:
@@ -197,8 +188,6 @@ def _compared(found: SampledNumber, drawn: Array, first: Array, nominal: float) 
         band=band * math.exp(log_ratio),
         band_low=low,
         band_high=high,
-        shift=shift,
-        shift_error=shift_error,
         outcome=DIFFERS if words else AGREES,
         verdict=", ".join(words) or AGREES,
     )
@@ -206,29 +195,15 @@ def _compared(found: SampledNumber, drawn: Array, first: Array, nominal: float) 
 
 def _jackknife(drawn: Array, first: Array) -> float:
     """Standard error of the logarithm of the ratio of two deviations over the same points."""
-    n = len(drawn)
-    logs = 0.5 * (_log_variances_without(drawn) - _log_variances_without(first))
-    if not np.isfinite(logs).all():
-        return math.inf
-    return math.sqrt((n - 1) / n * float(np.sum((logs - logs.mean()) ** 2)))
-
-
-def _log_variances_without(x: Array) -> Array:
-    """Logarithms of the variances with one point left out, (n,): the sum of squares loses
-    n / (n - 1) (x_i - mean)^2.
-    """
-    n, off = len(x), x - x.mean()
-    squares = np.sum(off**2) - n / (n - 1) * off**2
+    ours, theirs = ([np.var(np.delete(x, k)) for k in range(len(x))] for x in (drawn, first))
     with np.errstate(divide="ignore", invalid="ignore"):
-        logs: Array = np.log(np.maximum(squares, 0.0) / (n - 2))
-    return logs
+        logs = 0.5 * np.log(np.divide(ours, theirs))
+    return math.sqrt(len(drawn) - 1) * float(np.std(logs)) if np.isfinite(logs).all() else math.inf
 
 
 def sample_sentence(numbers: Sequence[SampledNumber]) -> str:
     """How many first-order bands the sample confirms, and how it was compared."""
     compared = [one for one in numbers if one.outcome != UNKNOWN_BAND]
-    if not compared:
-        return "No number has a first-order band to compare."
     agree = sum(one.outcome == AGREES for one in compared)
     return (
         f"First order agrees with the sample for {agree} of {len(compared)} numbers: to 95 % "

@@ -23,18 +23,8 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import bounds_of
 from upd.mesh.recipe_modules import READY
+from upd.scene import quantities as q
 from upd.scene.base import INSIDE
-from upd.scene.quantities import (
-    Example,
-    Rule,
-    hint_at,
-    hints,
-    must_be_given,
-    named_table,
-    notes,
-    quantity_kind,
-    without_notes,
-)
 from upd.scene.rotation import damper_mass
 from upd.scene.toml import put_back, toml_key, toml_value
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
@@ -207,9 +197,9 @@ def input_kind(scene: type[Any], recipe: str, steps: Sequence[str | int]) -> str
         known = {("geometry", f.name): f for f in fields(recipes.parameters(recipe))}
         found = known.get(tuple(steps))  # type: ignore[arg-type]
         return "" if found is None else str(found.metadata.get("quantity") or "")
-    hint = hint_at(scene, steps)
-    scalar = is_input(steps) and get_origin(without_notes(hint)) is not tuple
-    return quantity_kind(hint) if scalar else ""
+    hint = q.hint_at(scene, steps)
+    scalar = is_input(steps) and get_origin(q.without_notes(hint)) is not tuple
+    return q.quantity_kind(hint) if scalar else ""
 
 
 def scalar_input(
@@ -273,14 +263,14 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
 
     ``usual`` is the table that a scene without it has, if any.
     """
-    texts, types = entries(cls), hints(cls)
+    texts, types = entries(cls), q.hints(cls)
     tables: list[Iterator[SceneKey]] = []
     known = [f for f in fields(cls) if f.init and f.name not in INSIDE]
-    for f in sorted(known, key=lambda f: (f.name in _LAST, not must_be_given(f))):
+    for f in sorted(known, key=lambda f: (f.name in _LAST, not q.must_be_given(f))):
         here = getattr(value, f.name) if value is not None else None
         mine = given.get(f.name, {}) if isinstance(given, Mapping) else {}
         hint, where = types[f.name], (*path, f.name)
-        inner: Any = without_notes(hint)
+        inner: Any = q.without_notes(hint)
         default = f.default_factory() if f.default_factory is not MISSING else f.default
         default = default if usual is None else getattr(usual, f.name)
         if f.name == "geometry" and value is not None:
@@ -288,13 +278,13 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
         elif is_dataclass(inner) and (here is not None or value is None):
             table_default = default if is_dataclass(default) else None
             tables.append(_walk(inner, here, table_default, where, mine))  # type: ignore[arg-type]
-        elif item := named_table(hint):
+        elif item := q.named_table(hint):
             for name, one in ({_NAME: None} if here is None else here).items():
                 own = mine.get(name, {}) if isinstance(mine, Mapping) else {}
                 tables.append(_walk(item, one, None, (*where, name), own))
         else:
             # of a recipe's parameter its field has them
-            kind = str(f.metadata.get("quantity") or quantity_kind(hint))
+            kind = str(f.metadata.get("quantity") or q.quantity_kind(hint))
             meaning, _, cost = texts.get(f.name, "").replace("``", "").partition("Cost:")
             yield SceneKey(
                 where,
@@ -345,16 +335,17 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
 
 def _bounds(hint: Any) -> str:
     """In a few words: a list, choices, rules."""
-    inner = without_notes(hint)
+    inner = q.without_notes(hint)
     out = []
     if get_origin(inner) is tuple:
         inside = get_args(inner)
         out.append("a list" if inside[-1] is Ellipsis else f"a list of {len(inside)}")
-    noted, whole = list(notes(hint)), "whole number " * (inner is int)
+    noted, whole = list(q.notes(hint)), "whole number " * (inner is int)
     choices = [str(c) for n in noted if get_origin(n) is Literal for c in get_args(n)]
     out += [", ".join(choices)] if choices else []
-    out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
-    out += [n.bounds for n in noted if isinstance(n, Example) and n.bounds]
+    known = [n for n in noted if isinstance(n, q.Note) and n.bounds]
+    out += [f"{whole}{n.bounds}" for n in known if n.read is not None]
+    out += [n.bounds for n in known if n.read is None]
     return "; ".join(out)
 
 
@@ -365,9 +356,9 @@ def _text(value: Any, kind: str) -> str:
     if isinstance(value, (tuple, list)):
         return f"[{', '.join(_text(v, kind) for v in value)}]"
     if is_dataclass(value):
-        types = hints(type(value))
+        types = q.hints(type(value))
         inside = (
-            f"{toml_key(f.name)} = {_text(getattr(value, f.name), quantity_kind(types[f.name]))}"
+            f"{toml_key(f.name)} = {_text(getattr(value, f.name), q.quantity_kind(types[f.name]))}"
             for f in fields(value)
         )
         return f"{{ {', '.join(inside)} }}"

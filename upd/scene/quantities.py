@@ -8,7 +8,8 @@ import re
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, is_dataclass
+from dataclasses import MISSING, Field, dataclass, is_dataclass
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BeforeValidator
@@ -20,21 +21,35 @@ from upd.units import parse_quantity, quantity_text
 Steps = tuple[str | int, ...]
 
 
-class Example:
-    """What would do, and what a reference of the keys has of a value whose own validator reads it.
+@dataclass(frozen=True)
+class Note:
+    """What an annotation notes of a value: what reads or checks it, or what would do.
 
-    Parameters
+    Attributes
     ----------
+    read
+        Makes the value of what the file has, or checks it; None of an example.
     values
-        As TOML: what the message about a bad one proposes; several are the items of a list.
+        As TOML, of an example: what the message about a bad value proposes; several are the items
+        of a list.
     kind
         Of quantity, as in `upd.units.UNITS`; or the unit of a bare number.
     bounds
         In a few words.
     """
 
-    def __init__(self, *values: str, kind: str = "", bounds: str = "") -> None:
-        self.values, self.kind, self.bounds = values, kind, bounds
+    read: Callable[[Any], Any] | None = None
+    values: tuple[str, ...] = ()
+    kind: str = ""
+    bounds: str = ""
+
+    def __call__(self, value: Any) -> Any:
+        return value if self.read is None else self.read(value)
+
+
+def Example(*values: str, kind: str = "", bounds: str = "") -> Note:
+    """What would do, and kind and bounds of a value whose own validator reads it."""
+    return Note(None, values, kind, bounds)
 
 
 @dataclass(frozen=True)
@@ -74,11 +89,12 @@ class Uncertainty:
         return moved if self.kind == "fraction" else quantity_text(moved, self.kind)
 
 
-@dataclass(frozen=True)
-class QuantityReader:
+def quantity(
+    kind: str, words: Mapping[str, Any] = MappingProxyType({}), others: str = ""
+) -> BeforeValidator:
     """Number or text with a unit -> number in mm, N, MPa, t, s.
 
-    Attributes
+    Parameters
     ----------
     words
         That may stand in its place -> what they mean.
@@ -86,47 +102,35 @@ class QuantityReader:
         What a message about anything else adds about them.
     """
 
-    kind: str
-    words: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    others: str = ""
-
-    def __call__(self, value: Any) -> Any:
-        if isinstance(value, str) and value in self.words:
-            return self.words[value]
+    def read(value: Any) -> Any:
+        if isinstance(value, str) and value in words:
+            return words[value]
         try:
-            return parse_quantity(value, self.kind)
+            return parse_quantity(value, kind)
         except InputError as error:
-            raise ValueError(f"{error}{self.others}") from None
+            raise ValueError(f"{error}{others}") from None
+
+    return BeforeValidator(Note(read, kind=kind))
 
 
-@dataclass(frozen=True)
-class Rule:
-    """What a value must hold; ``message`` ends the sentence that begins with one that does not."""
-
-    holds: Callable[[Any], bool]
-    message: str | Callable[[Any], str]
-    bounds: str
-
-    def __call__(self, value: Any) -> Any:
-        if not self.holds(value):
-            message = self.message if isinstance(self.message, str) else self.message(value)
-            short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**15)
-            raise ValueError(f"{value:g} {message}" if short else f"{value!r} {message}")
-        return value
-
-
-def quantity(kind: str) -> BeforeValidator:
-    """Number or text with a unit -> number in mm, N, MPa, t, s."""
-    return BeforeValidator(QuantityReader(kind))
-
-
-def must(rule: Callable[[Any], bool], message: str, bounds: str = "") -> AfterValidator:
+def must(
+    rule: Callable[[Any], bool], message: str | Callable[[Any], str], bounds: str = ""
+) -> AfterValidator:
     """A value that breaks ``rule`` is a problem.
 
     ``message`` ends the sentence that begins with the value; ``bounds`` are the rule in a few
     words, for the reference of the keys (without them what the message forbids).
     """
-    return AfterValidator(Rule(rule, message, bounds or f"none that {message.partition(';')[0]}"))
+
+    def check(value: Any) -> Any:
+        if not rule(value):
+            why = message if isinstance(message, str) else message(value)
+            short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**15)
+            raise ValueError(f"{value:g} {why}" if short else f"{value!r} {why}")
+        return value
+
+    known = bounds or f"none that {str(message).partition(';')[0]}"
+    return AfterValidator(Note(check, bounds=known))
 
 
 def one_of(names: Sequence[str]) -> AfterValidator:
@@ -136,7 +140,7 @@ def one_of(names: Sequence[str]) -> AfterValidator:
     def message(value: Any) -> str:
         return f"is none of its values{did_you_mean(value, names, f'write one of {known}')}"
 
-    return AfterValidator(Rule(lambda v: v in names, message, known))
+    return must(lambda v: v in names, message, known)
 
 
 def is_whole(value: Any) -> bool:
@@ -206,12 +210,10 @@ EQUILIBRIA = ("opposing", "frictionless", "reversed")
 #: A normal force in N, or the name of an equilibrium.
 NormalLoad = Annotated[
     float | str,
-    BeforeValidator(
-        QuantityReader(
-            "force",
-            {name: name for name in EQUILIBRIA},
-            f"; or one of {', '.join(map(repr, EQUILIBRIA))} (equilibrium under loads.centrifugal)",
-        )
+    quantity(
+        "force",
+        {name: name for name in EQUILIBRIA},
+        f"; or one of {', '.join(map(repr, EQUILIBRIA))} (equilibrium under loads.centrifugal)",
     ),
     must(lambda v: isinstance(v, str) or v >= 0.0, _PULLS, f">= 0, or {', '.join(EQUILIBRIA)}"),
     Example('"50 N"', '"200 N"'),
@@ -219,12 +221,10 @@ NormalLoad = Annotated[
 #: Direction of a tangential load in degrees from the patch's x.
 Direction = Annotated[
     float,
-    BeforeValidator(
-        QuantityReader(
-            "angle",
-            {"x": 0.0, "y": 90.0},
-            '; or "x" (along the longer edge of the patch), "y" (across it)',
-        )
+    quantity(
+        "angle",
+        {"x": 0.0, "y": 90.0},
+        '; or "x" (along the longer edge of the patch), "y" (across it)',
     ),
     Example('"x"', '"30 deg"', bounds="an angle, x or y"),
 ]
@@ -359,5 +359,4 @@ def notes(hint: Any) -> Iterator[Any]:
 
 def quantity_kind(hint: Any) -> str:
     """Kind of the quantity, or the unit of a bare number; "" of what is none."""
-    readers = (n.kind for n in notes(hint) if isinstance(n, (QuantityReader, Example)) and n.kind)
-    return next(readers, "")
+    return next((n.kind for n in notes(hint) if isinstance(n, Note) and n.kind), "")

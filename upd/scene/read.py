@@ -28,7 +28,7 @@ from upd.scene.contact import Scene
 from upd.scene.forced import FORCED, ForcedScene
 from upd.scene.measured import note_files
 from upd.scene.modal import ModalScene
-from upd.scene.quantities import Example, hint_at, hints, must_be_given, path_of, without_notes
+from upd.scene.quantities import Note, hint_at, hints, must_be_given, path_of, without_notes
 from upd.scene.seated import SEATED, SeatedScene
 from upd.scene.toml import plain, read_overrides, toml_value
 from upd.scene.uncertain import taken_out, uncertainties
@@ -477,7 +477,7 @@ def _items(wanted: Any) -> tuple[str, ...]:
     """TOML of one or more values that would do."""
     origin, inside = get_origin(wanted), get_args(wanted)
     if origin is Annotated:
-        given = next((note for note in wanted.__metadata__ if isinstance(note, Example)), None)
+        given = next((note for note in wanted.__metadata__ if isinstance(note, Note)), None)
         return given.values if given else _items(inside[0])
     if origin in (Union, types.UnionType):
         return _items(next(kind for kind in inside if kind is not type(None)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
-from upd.report.answer_folder import FigureAnswer
+from upd.report.answer import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene.rotation import damper_mass
 from upd.sizing.ranges import FORCE, TURNING, InputRange, Ranges, RigPeaks

@@ -67,8 +67,8 @@ def test_terminal_page_and_files_tell_them(sphere: upd.RunResult) -> None:
     assert "Error of the maximum pressure: mesh" in text
     entry = row.as_dict()
     (part,) = error_parts(entry)
-    assert part[:3] == ("mesh", row.estimated_error, pytest.approx(1.0))
-    assert "mesh" in budget_table([entry]).rows[0] and "100 %" in budget_table([entry]).rows[0]
+    assert part[:2] == ("mesh", row.estimated_error)
+    assert "mesh" in budget_table([entry]).rows[0]
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_an_answer_says_when_finer_levels_do_not_help(
     inputs = (InputPart("contact.friction", 0.1, 0.03, "x"),)
     mesh = (ErrorPart("mesh", error, "coarser", 3.0),)
     numbers = tuple(with_parts(replace(r, inputs=inputs), mesh) for r in sphere.results)
-    lines = " ".join(line.text for line in replace(sphere, results=numbers).answer(200))
+    lines = " ".join(text for text, _ in replace(sphere, results=numbers).answer(200))
     assert "input contact.friction 3 %" in lines
     assert ("finer levels do not help" in lines) == more
 

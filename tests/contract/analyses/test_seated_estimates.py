@@ -78,7 +78,7 @@ def test_terminal_and_page_tell_them(wedge: upd.RunResult) -> None:
     parts = error_parts(row.as_dict())
     assert {source for source, *_ in parts} == {MESH, STEPS}
     # an error that is exactly zero has no half
-    assert all(bool(half) == bool(error) for _, error, _, half, _ in parts)
+    assert all(bool(half) == bool(error) for _, error, half, _ in parts)
 
 
 @pytest.mark.parametrize("scene", ["symmetric-seated", "asymmetric-seated"])

@@ -27,7 +27,7 @@ from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sweep_charts import sweep_charts
 from upd.report import sweep_page, write_comparison, write_report
-from upd.report.sweep_page import MOST_ROWS, grouped, read_sweep, sweep_panels, verdict
+from upd.report.sweep_page import MOST_ROWS, grouped, read_sweep, sweep_sections, verdict
 from upd.results import Case, Result
 from upd.vary.outcome import Outcome
 
@@ -241,8 +241,8 @@ def test_more_parameters_give_a_curve_per_combination_of_the_others(tmp_path: Pa
     assert [t.label for t in chart.traces] == ["b 1, e x", "b 1, e y", "b 2, e x", "b 2, e y"]
     np.testing.assert_array_equal(chart.traces[1].y, [1.0, 5.0, 9.0])
     np.testing.assert_array_equal(chart.traces[2].y, [2.0, 6.0, 10.0])
-    (panel,) = sweep_panels(read_sweep(made.path))
-    assert panel.heading == "Followed numbers over a and b and e"
+    (page_chart,) = (c for one in sweep_sections(read_sweep(made.path)) for c in one.charts)
+    assert page_chart.heading == "Followed numbers over a and b and e"
 
 
 def test_one_value_everywhere_is_told(tmp_path: Path) -> None:
@@ -257,14 +257,13 @@ def test_one_value_everywhere_is_told(tmp_path: Path) -> None:
 
 def test_a_grid_of_one_point_still_has_a_page(tmp_path: Path) -> None:
     made = _made(tmp_path / "s", {"a": [1]})
-    assert sweep_panels(read_sweep(made)) == []
     assert "left no figures" in write_report(made).read_text("utf-8")
 
 
 def test_all_failed(tmp_path: Path) -> None:
     made = _made(tmp_path / "s", {"F": ["1 N", "2 N"]}, {0: "no <b>luck</b>", 1: "no <b>luck</b>"})
     text = write_report(made).read_text("utf-8")
-    assert "None of 2 points could be solved." in text
+    assert "0 of 2 points done, 2 failed." in text
     assert "no &lt;b&gt;luck" in text and "no <b>luck" not in text
 
 
@@ -281,7 +280,7 @@ def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "s", {"F": [f"{k} N" for k in range(12)]}))
     table = grouped("t", made, [["rare"] if k == 0 else ["often"] for k in range(12)])
     assert [row[:2] for row in table.rows] == [("often", "11"), ("rare", "1")]
-    assert table.rows[0][2].endswith("F 8 N and 3 more") and table.rows[1][2] == "F 0 N"
+    assert table.rows[0][2].endswith("F 8 N; and 3 more") and table.rows[1][2] == "F 0 N"
 
 
 @pytest.mark.parametrize(
@@ -290,25 +289,24 @@ def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
 )
 def test_verdict(failed: int, warned: int, kind: str) -> None:
     points = [
-        sweep_page._SweepPoint([], "failed" if k < failed else "ok", "", ["w"] * (k < warned), 1.0)
+        {"status": "failed" if k < failed else "ok", "warnings": ["w"] * (k < warned)}
         for k in range(3)
     ]
-    assert verdict(points).kind == kind
+    assert verdict(points)[0] == kind
 
 
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        ({"points": [3]}, "damaged in points"),
-        ({"axes": [{"path": 1}]}, "damaged in axes"),
-        ({"cost": 3}, "damaged in cost"),
+        ({"cost": None}, "damaged in cost"),
         ({"points": [], "sha256": "1"}, "not as upd sweep wrote it"),
     ],
 )
 def test_damaged_sweep_is_told(tmp_path: Path, more: dict[str, Any], told: str) -> None:
     made = _made(tmp_path / "s", {"a": [1, 2]})
     whole = json.loads((made / "sweep.json").read_text("utf-8"))
-    (made / "sweep.json").write_text(json.dumps(whole | more), "utf-8")
+    changed = {key: value for key, value in (whole | more).items() if value is not None}
+    (made / "sweep.json").write_text(json.dumps(changed), "utf-8")
     with pytest.raises(InputError, match=told):
         write_report(made)
     assert not (made / "report.html").exists()

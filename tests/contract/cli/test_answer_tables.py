@@ -196,7 +196,8 @@ def test_why_a_number_has_no_error_is_told_below_the_table(told: RunResult) -> N
     size = {"analysis": "another"}
     first = {**entries[0], "estimated_error": None}
     second = {**entries[1], "estimated_error": None}
-    told_of = "Errors are not estimated: one level only."
+    both = "; ".join(number_label(one["name"]) for one in entries)
+    told_of = f"{both} without ±: one level only."
     assert answer_tables(size, [first, second])[0].note == told_of
     known = {**second, "estimated_error": 0.01, "error_parts": []}
     note = answer_tables(size, [first, known])[0].note

@@ -269,9 +269,9 @@ SUMMARIES: dict[str, tuple[bytes | None, str]] = {
     "empty": (b"", "is not JSON"),
     "cut": (json.dumps(SUMMARY).encode()[:40], "is not JSON"),
     "binary": (bytes(range(256)), "summary.json"),
-    "a list": (b"[1, 2]", "damaged"),
+    "a list": (b"[1, 2]", "is not JSON of a run"),
     "keys missing": (b'{"scene": "a"}', "damaged in title"),
-    "wrong kinds": (json.dumps({**SUMMARY, "results": [1], "size": 3}).encode(), "summary.json"),
+    "wrong kinds": (json.dumps({**SUMMARY, "results": [1], "size": 3}).encode(), "damaged in size"),
     "changed": (
         json.dumps({**SUMMARY, "checks": [{}], "results": [{}], "sha256": "1"}).encode(),
         "summary.json: is not as upd run wrote it",

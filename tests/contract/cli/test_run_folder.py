@@ -127,10 +127,17 @@ def test_what_is_not_ours_is_never_removed(tmp_path: Path, beside_a_run: bool) -
     (place / "scene.toml").touch()
     (place / "notes.txt").write_text("mine", encoding="utf-8")
     before = {p: p.read_bytes() for p in place.rglob("*") if p.is_file()}
-    with pytest.raises(InputError, match=r"notes\.txt.*--out" if beside_a_run else "holds no run"):
+    with pytest.raises(InputError, match=r"holds what no run wrote \(notes\.txt\).*--out"):
         run("hertz", overrides=TINY, out=place, report=False)
     assert {p: p.read_bytes() for p in place.rglob("*") if p.is_file()} == before
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_folder_with_a_scene_alone_is_no_run(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").touch()
+    with pytest.raises(InputError, match="holds no run"):
+        run("hertz", overrides=TINY, out=tmp_path, report=False)
+    assert (tmp_path / "scene.toml").exists()
 
 
 @pytest.mark.usefixtures("plain")

@@ -141,9 +141,9 @@ def test_a_changed_summary_is_named_with_the_remedy(folder: Path, tmp_path: Path
     assert load(copy).results
     data["results"][1]["value"] = 3.0
     (copy / "summary.json").write_text(json.dumps(data), "utf-8")
-    with pytest.raises(InputError, match=r"summary\.json: is not as .* run the scene again"):
+    with pytest.raises(InputError, match=r"summary\.json: is not as .* call upd run again"):
         load(copy)
     del data["cost"]
     (copy / "summary.json").write_text(json.dumps(data), "utf-8")
-    with pytest.raises(InputError, match=r"summary\.json: is damaged in cost; run the scene again"):
+    with pytest.raises(InputError, match=r"summary\.json: is damaged in cost; call upd run again"):
         load(copy)

@@ -15,9 +15,8 @@ import upd
 from upd.errors import InputError
 from upd.labels import file_name
 from upd.report import notebook
-from upd.report.files import write_curves
 from upd.report.folder import read_run
-from upd.report.notebook import RunResult
+from upd.report.notebook import RunResult, write_curves
 
 SCENES = ("hertz", "symmetric", "rig")
 

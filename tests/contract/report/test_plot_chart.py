@@ -50,7 +50,7 @@ from upd.plot.style import (
     with_room,
 )
 from upd.plot.work_precision import work_precision_charts
-from upd.report.compare import overlaid
+from upd.report.run_page import overlaid
 
 X, Y = Axis("x", "mm"), Axis("y", "N")
 T = np.array([0.0, 1.0, 2.0])

@@ -26,10 +26,9 @@ from upd.plot.chart import Chart
 from upd.plot.plotly import figure, pack
 from upd.reference import mindlin
 from upd.report import write_comparison, write_report
-from upd.report.compare import differences, numbers, overlaid, run_names
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import fitting
-from upd.report.run_page import run_surfaces
+from upd.report.run_page import differences, numbers, overlaid, run_names, run_surfaces
 from upd.report.tables import all_numbers, analysis_charts, filled, main_numbers, warnings
 from upd.results.check import worst_checks
 from upd.results.quantities import number_label
@@ -343,7 +342,6 @@ def test_comparison_shows_both_runs_and_their_difference(
     assert "<script>alert" not in html and all(a.startswith("data:") for a in _Page(html).addresses)
     text = " ".join(" ".join(_Page(html).text).split())
     assert "geometry.divisions 16 12" in text and "geometry.radius" not in text
-    assert "divisions = 12" in text and "divisions = 16" in text
     for run_folder in (folder, other):
         row = next(
             r for r in read_run(run_folder).summary["results"] if r["name"] == "max_pressure"
@@ -417,7 +415,7 @@ def test_a_page_is_made_from_what_is_left(copy: Path, name: str, content: bytes 
     [
         (None, "no run folder"),
         ("{", "not JSON"),
-        ("[]", "damaged in the whole"),
+        ("[]", "not JSON of a run"),
         ('{"scene": "x"}', "damaged in title, status"),
     ],
 )

@@ -25,7 +25,7 @@ from upd import run
 from upd.analyses import contact
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.report import write_report
-from upd.report.page import Section, make_panels, page_text, write_page
+from upd.report.page import Section, page_text, write_page
 from upd.results.answer_table import AnswerTable
 
 PHONE, DESK, SCREEN = 390, 1280, 800
@@ -276,8 +276,7 @@ def _area(box: list[float]) -> float:
 
 async def _crowded(tab: Tab, page: Path) -> dict[str, Any]:
     """Rectangles of crowded charts at both widths."""
-    panels = make_panels([_crowd(5), _crowd(30)], {})
-    write_page(page, page_text("t", [Section("Figures", panels=panels)]))
+    write_page(page, page_text("t", [Section("Figures", charts=[_crowd(5), _crowd(30)])]))
     out = {}
     for width in (PHONE, DESK):
         await tab.open(page, width)

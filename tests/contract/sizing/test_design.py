@@ -232,6 +232,4 @@ def test_in_a_notebook() -> None:
     omega = 4000.0 * 2.0 * math.pi / 60.0
     assert found.centrifugal == pytest.approx(7.8e-9 * 9180.0 * 300.0 * omega**2)
     assert "F_C 3769.1 N = m r w^2: damper 71.604 g, 300 mm, 4000 rpm" in found.table()
-    page = found._repr_html_()
-    assert "tilts" in page
-    assert 'src="data:image/webp;base64,' in page
+    assert "tilts" in found.table()
