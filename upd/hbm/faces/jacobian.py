@@ -68,7 +68,7 @@ def law_rows(node, law, on, nodes, rows, H, W):  # type: ignore[no-untyped-def]
             cols[k], owner[k] = a * n + i, i
             k += 1
     left[:k] = 0.0
-    w, o = np.empty(3), np.empty(3)
+    w, slips = np.empty(3), np.empty(3)
     for row in range(k):
         i, first = owner[row], row
         while first > 0 and owner[first - 1] == i:
@@ -78,14 +78,14 @@ def law_rows(node, law, on, nodes, rows, H, W):  # type: ignore[no-untyped-def]
             v1, v2 = f[n + i] / size, f[2 * n + i] / size
             if row == first:
                 left[row] = mu[i] * f[i] - size
-                w[0], w[1], w[2], o[1], o[2] = -mu[i], v1, v2, 0.0, 0.0
+                w[0], w[1], w[2], slips[1], slips[2] = -mu[i], v1, v2, 0.0, 0.0
             else:
                 # no slip across v; of the size of the other row
                 w[:] = 0.0
-                o[1], o[2] = v2 * rho_t[i], -v1 * rho_t[i]
+                slips[1], slips[2] = v2 * rho_t[i], -v1 * rho_t[i]
         else:
-            row_weights(cols[row], node, law, False, w, o)
-        P[row], keep[row, 0], keep[row, 1] = w, -o[1], -o[2]
+            row_weights(cols[row], node, law, False, w, slips)
+        P[row], keep[row, 0], keep[row, 1] = w, -slips[1], -slips[2]
         for j in range(k):
             d = cols[j]
             H[row, j] = w[0] * W[i, d] + (w[1] * W[n + i, d] + w[2] * W[2 * n + i, d])
