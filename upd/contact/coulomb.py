@@ -62,9 +62,6 @@ NEWTON_STEPS = 40
 FALLBACK_STEPS = 20_000
 #: Guard of a search that ends by proof, but not in a number of steps known beforehand.
 MOTION_STEPS = 200
-#: Springs that relax, softer than the stuck contact by this, and rounds with each; any are exact.
-SOFTNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e3, 1e1)
-MULTIPLIER_STEPS = 5
 
 
 class Coulomb(CoulombConditions):
@@ -153,9 +150,9 @@ class Coulomb(CoulombConditions):
         used += answer.iterations
         if answer.converged:
             return replace(answer, iterations=used, method="fallback")
-        convex = self.pressed is not None and load is not None
-        answer = self._by_motion(step) if convex else self._by_multipliers(step, start)
-        used += answer.iterations
+        if self.pressed is not None and load is not None:
+            answer = self._by_motion(step)
+            used += answer.iterations
         if not answer.converged:
             answer = self.fall_back(step)
             used += answer.iterations
@@ -174,7 +171,6 @@ class Coulomb(CoulombConditions):
         best: CoupledStep | None = None
         ahead: CoupledStep | None = None
         fine = len(self.C) * EPS
-        hold = step.load is not None and self.pressed is not None
         for used in range(1, limit + 1):
             answer = (
                 self.judged(step, at, used) if ahead is None else replace(ahead, iterations=used)
@@ -189,9 +185,6 @@ class Coulomb(CoulombConditions):
                 if answer.residual <= fine or self.pressed is not None:
                     break
             rows = self.rows_at(at)
-            if hold and rows.relaxed.all():
-                # Rarely the answer, and a poor place to come from: once is refused.
-                rows, hold = self._held(step, at, rows), False
             near = self._nearby(step, at, rows)
             if near is not None:
                 at = near
@@ -212,17 +205,6 @@ class Coulomb(CoulombConditions):
                 break
         assert best is not None
         return best
-
-    def _held(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> NewtonRows:
-        """Instead of a set that slips everywhere: those nodes stick that slip least, enough to take
-        up what the load leaves.
-        """
-        assert step.load is not None and self.pressed is not None
-        limit, slips = self.mu * self.pressed, (at.y.reshape(self.c, self.n) ** 2).sum(axis=0)
-        order = np.argsort(slips, kind="stable")
-        missing = limit.sum() - float(np.linalg.norm(step.load))
-        count = int(np.searchsorted(np.cumsum(limit[order]), missing)) + 1
-        return self._stuck_at(rows, order[:count])
 
     def _let_go(self, step: AskedStep, start: Iterate | None) -> Iterate:
         """No forces under no load: the bodies as near to each other as nothing touches, from where
@@ -366,53 +348,6 @@ class Coulomb(CoulombConditions):
         return self.system_of(rows, False).solve(zero, AskedStep(zero, None, np.eye(r)))[0]
 
     # -- fallback ----------------------------------------------------------------------------------
-
-    def _by_multipliers(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
-        """Springs on the rigid motions that relax: the method of multipliers.
-
-        A body that few nodes hold leaves Newton singular systems. Springs K from where it was,
-        B'f = p - K (s - s_k), keep them regular; without s, they are a contact under a given
-        motion,
-
-            (C + B K^-1 B') f - B (s_k + K^-1 p) = b + y,   s = s_k + K^-1 (p - B'f),
-
-        and s_k follows s. Without friction, a convex programme, this converges for every K [1]_.
-
-        References
-        ----------
-        .. [1] R. T. Rockafellar, Math. Oper. Res. 1 (1976) 97.
-        """
-        best = self._newton(step, start, 1)
-        if step.load is None:
-            return best
-        _, A = self.carried
-        try:
-            s, used = best.at.s if start is None else start.s, 0
-            at: Iterate | None = None
-            for k in range(len(SOFTNESS) * MULTIPLIER_STEPS):
-                if k % MULTIPLIER_STEPS == 0:
-                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do, and
-                    # bring back the digits at the end.
-                    soft = SOFTNESS[k // MULTIPLIER_STEPS] * A
-                    held = Coulomb(self.C + self.B @ soft @ self.B.T, self.B, self.mu)
-                pulled = AskedStep(step.b, None, s + soft @ step.load)
-                inner = held._newton(pulled, at, NEWTON_STEPS)
-                if not inner.converged and at is not None:
-                    inner = held._newton(pulled, None, NEWTON_STEPS)
-                used += inner.iterations
-                at = inner.at
-                assert pulled.motion is not None
-                s = pulled.motion - soft @ (self.B.T @ at.f)
-                # Fewer nodes than motions may carry the load: then the springs alone end it, for
-                # Newton's system under the load is singular.
-                answer = self._ended(step, Iterate(at.f, s, at.y))
-                used += answer.iterations
-                best = answer if answer.residual < best.residual else best
-                if answer.converged or not inner.converged:
-                    break
-        except np.linalg.LinAlgError:
-            self._forget()
-        return replace(best, iterations=used)
 
     def _by_motion(self, step: AskedStep) -> CoupledStep:
         """The load met by a search for the motion, where the pressing forces are given.

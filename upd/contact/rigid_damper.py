@@ -319,18 +319,15 @@ def face_forces(left: float, right: float, centrifugal: float, ratio: float) -> 
         )
     # Both sines vanish together when both resultants are vertical: each face then carries half.
     together = math.sin(a + b - 2.0 * phi)
-    shares = (
-        (0.5, 0.5)
-        if together == 0.0
-        else (math.sin(b - phi) / together, math.sin(a - phi) / together)
-    )
-    for side, share in zip(("left", "right"), shares, strict=True):
-        if share < -4.0 * math.ulp(1.0):
-            raise InputError(
-                f"the damper lifts off its {side} face: with faces at {left:g} and "
-                f"{right:g} deg and T/N = {ratio:.4g} "
-                f"that face would have to pull; T/N can be at most {largest_ratio(left, right):.4g}"
-            )
+    sines = (math.sin(b - phi), math.sin(a - phi))
+    shares = [sine / together for sine in sines] if together else [0.5, 0.5]
+    if min(shares) < -4.0 * math.ulp(1.0):
+        side = "left" if shares[0] < shares[1] else "right"
+        raise InputError(
+            f"the damper lifts off its {side} face: with faces at {left:g} and {right:g} deg and "
+            f"T/N = {ratio:.4g} that face would have to pull; T/N can be at most "
+            f"{largest_ratio(left, right):.4g}"
+        )
     normal = [centrifugal * math.cos(phi) * max(0.0, share) for share in shares]
     return FaceForces(ratio, normal[0], ratio * normal[0], normal[1], ratio * normal[1])
 

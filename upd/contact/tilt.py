@@ -156,22 +156,26 @@ def tilted_contact(
         tilts = np.eye(2)[:, np.array(free)]
         sides = _sides(problems, T, tilts)
         if F == 0.0:
-            problems.add(
-                bool(M.any()),
-                f"moment is {M} N mm under no load: nothing can carry it, give a load or "
-                "no moment.",
-            )
-            problems.raise_any()
-            approach, none = float(h.min()), np.zeros(2)
-            message = (
-                "The load is zero: the bodies touch without force and without tilt at the smallest "
-                f"gap, approach {approach:g} mm."
-            )
-            normal = apart(h, approach, "no load", message)
-            return TiltedContact(normal, none, none, "no load", message, np.zeros((3, 3)))
+            return _unloaded(problems, h, M)
         face = _supporting_face(problems, sides, T, M / F, tilts)
         problems.raise_any()
         return _solve(C, h, T, F, M, mask, face, sum(free))
+
+
+def _unloaded(problems: Problems, h: FloatArray, M: FloatArray) -> TiltedContact:
+    """Bodies that touch without force."""
+    problems.add(
+        bool(M.any()),
+        f"moment is {M} N mm under no load: nothing can carry it, give a load or no moment.",
+    )
+    problems.raise_any()
+    approach, none = float(h.min()), np.zeros(2)
+    message = (
+        "The load is zero: the bodies touch without force and without tilt at the smallest gap, "
+        f"approach {approach:g} mm."
+    )
+    normal = apart(h, approach, "no load", message)
+    return TiltedContact(normal, none, none, "no load", message, np.zeros((3, 3)))
 
 
 @dataclass(frozen=True)

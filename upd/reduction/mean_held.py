@@ -34,7 +34,6 @@ force at the far end balances it, and half of the stretch is seen.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -82,8 +81,7 @@ def condense_held_in_mean(
     solver: str = "auto",
     layout: ArrayLike | None = None,
     points: ArrayLike | None = None,
-    keep_factor: bool = True,
-    memory_limit_bytes: float | None = None,
+    **more: Any,
 ) -> Condensed:
     """Condense a body onto some of its dofs, its rigid motions held in a weighted mean.
 
@@ -97,8 +95,8 @@ def condense_held_in_mean(
         over a surface [mm2].
     motions : (n, m) array_like
         R, all rigid motions that the other supports leave.
-    solver, layout, points, keep_factor, memory_limit_bytes
-        As for `condense`.
+    solver, layout, points, more
+        As for `condense`: `keep_factor` and `memory_limit_bytes` are more.
 
     Returns
     -------
@@ -125,18 +123,10 @@ def condense_held_in_mean(
     inner = np.setdiff1d(np.arange(n), held)
     K_h, at = submatrix_of(A, inner), np.searchsorted(inner, kept)
     places = None if layout is None else np.asarray(layout)[inner]
-    found = condense(
-        K_h,
-        at,
-        solver=solver,
-        rigid_modes=R[inner],
-        layout=places,
-        points=points,
-        keep_factor=keep_factor,
-        memory_limit_bytes=memory_limit_bytes,
-    )
+    near: dict[str, Any] = {"layout": places, "points": points}
+    found = condense(K_h, at, solver=solver, rigid_modes=R[inner], **near, **more)
     X = np.zeros_like(W)
-    X[inner] = _loaded(K_h, W[inner], found.solver, R[inner], places, points)
+    X[inner] = _loaded(K_h, W[inner], found.solver, R[inner], near)
     C_h = found.compliance()
     T = np.linalg.solve(mean, R[kept].T)
     across = X[kept] @ T
@@ -181,21 +171,12 @@ _LOOSE = (
 
 
 def _loaded(
-    K: Any,
-    loads: FloatArray,
-    solver: str,
-    modes: FloatArray,
-    layout: IntArray | None,
-    points: ArrayLike | None,
+    K: Any, loads: FloatArray, solver: str, modes: FloatArray, near: dict[str, Any]
 ) -> FloatArray:
     """K^-1 loads by the solver that condensed K."""
     if solver == "amg":
-        columns = [amg_solve(K, load, modes, layout=layout, points=points).x for load in loads.T]
-        return np.stack(columns, axis=1)
-    solve: Callable[[FloatArray], FloatArray] = factorise(
-        K, solver="auto" if solver == "none" else solver
-    )
-    return solve(loads)
+        return np.stack([amg_solve(K, load, modes, **near).x for load in loads.T], axis=1)
+    return factorise(K, solver="auto" if solver == "none" else solver)(loads)
 
 
 __all__ = ["condense_held_in_mean", "motions_left"]

@@ -318,8 +318,8 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
     "analyses": 11448,
-    "hbm": 6281,
-    "contact": 3532,
+    "hbm": 6244,
+    "contact": 3455,
     "linalg": 2716,
     "scene": 2195,
     "plot": 1483,
@@ -332,7 +332,7 @@ ROOM_LINES = {
     "reference": 915,
     "cli": 816,
     "measured": 814,
-    "reduction": 1116,
+    "reduction": 1097,
     "results": 710,
     "fem": 728,
     "matrices": 616,

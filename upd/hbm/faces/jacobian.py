@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.faces.step import OPEN, STICK, slip_rows
+from upd.hbm.faces.step import OPEN, STICK, row_weights
 from upd.linalg.compiled import compiled
 from upd.linalg.compiled_lu import factor_columns, invert_columns, solve_columns
 
@@ -58,8 +58,8 @@ def law_rows(node, law, on, nodes, rows, H, W):  # type: ignore[no-untyped-def]
     int
         Rows k.
     """
-    f, y, state = node
-    mu, rho_n, rho_t = law
+    f, _, state = node
+    mu, _, rho_t = law
     cols, owner, P, left, keep = rows
     n, k = len(state), 0
     for o in range(nodes):
@@ -68,50 +68,30 @@ def law_rows(node, law, on, nodes, rows, H, W):  # type: ignore[no-untyped-def]
             cols[k], owner[k] = a * n + i, i
             k += 1
     left[:k] = 0.0
-    keep[:k] = 0.0
-    row = 0
-    while row < k:
-        i = cols[row] % n
+    w, slips = np.empty(3), np.empty(3)
+    for row in range(k):
+        i, first = owner[row], row
+        while first > 0 and owner[first - 1] == i:
+            first -= 1
         if state[i] == VERGE:
             size = np.sqrt(f[n + i] ** 2 + f[2 * n + i] ** 2)
             v1, v2 = f[n + i] / size, f[2 * n + i] / size
-            left[row] = mu[i] * f[i] - size
-            P[row, 0], P[row, 1], P[row, 2] = -mu[i], v1, v2
-            P[row + 1] = 0.0
-            for j in range(k):
-                H[row, j] = -mu[i] * W[i, cols[j]]
-                H[row, j] += v1 * W[n + i, cols[j]] + v2 * W[2 * n + i, cols[j]]
-                H[row + 1, j] = 0.0
-            # no slip across v; of the size of the other row
-            keep[row + 1, 0], keep[row + 1, 1] = -v2 * rho_t[i], v1 * rho_t[i]
-            H[row + 1, row], H[row + 1, row + 1] = keep[row + 1]
-            row += 2
-            continue
-        if state[i] == OPEN:
-            for a in range(3):
-                P[row + a] = 0.0
-                P[row + a, a] = 1.0
-                for j in range(k):
-                    H[row + a, j] = W[cols[row + a], cols[j]]
-            row += 3
-            continue
-        t11, t12, t21, t22, v1, v2, _, _ = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
-        for a in range(2):
-            t1, t2, v = (t11, t12, v1) if a == 0 else (t21, t22, v2)
-            P[row + a, 0] = -mu[i] * v
-            P[row + a, 1], P[row + a, 2] = (
-                (1.0 if a == 0 else 0.0) - t1,
-                (1.0 if a == 1 else 0.0) - t2,
-            )
-            keep[row + a, 0], keep[row + a, 1] = rho_t[i] * t1, rho_t[i] * t2
-            for j in range(k):
-                total = 0.0
-                for e in range(3):
-                    total += P[row + a, e] * W[e * n + i, cols[j]]
-                H[row + a, j] = total
-            for e in range(2):
-                H[row + a, row + e] += keep[row + a, e]
-        row += 2
+            if row == first:
+                left[row] = mu[i] * f[i] - size
+                w[0], w[1], w[2], slips[1], slips[2] = -mu[i], v1, v2, 0.0, 0.0
+            else:
+                # no slip across v; of the size of the other row
+                w[:] = 0.0
+                slips[1], slips[2] = v2 * rho_t[i], -v1 * rho_t[i]
+        else:
+            row_weights(cols[row], node, law, False, w, slips)
+        P[row], keep[row, 0], keep[row, 1] = w, -slips[1], -slips[2]
+        for j in range(k):
+            d = cols[j]
+            H[row, j] = w[0] * W[i, d] + (w[1] * W[n + i, d] + w[2] * W[2 * n + i, d])
+        if state[i] != OPEN:
+            H[row, first] += keep[row, 0]
+            H[row, first + 1] += keep[row, 1]
     return k
 
 

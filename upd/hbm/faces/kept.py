@@ -36,10 +36,14 @@ from upd.hbm.faces.step import (
     contact_step,
     fetch_row,
     judge,
+    misfit_allowed,
     newton_rows,
     put,
     put_row,
-    slip_rows,
+    row_weights,
+    split,
+    unknown_dofs,
+    without_rounding,
 )
 from upd.linalg.compiled import compiled, inlined, joined
 
@@ -141,19 +145,17 @@ def kept_step(sample, x0, bases, one, law, node, kept, scratch):  # type: ignore
     mu, rho_n, rho_t = law
     f, y, state = node
     suits, inverses = kept
-    cols, sign, _, _, H = scratch
+    cols, sign, _, H = scratch
     n = len(mu)
-    k, same = _unknowns(sample, base, one, state, suits, cols, sign)
+    k = unknown_dofs(base, one, state, cols, sign)
     if k <= FEW or k * k > inverses.shape[1]:
         return -1
-    allowed = 0.0
-    for i in range(n):
-        if not base[one, i]:
-            allowed = max(allowed, SOLVED * max(abs(x0[i]), abs(x0[n + i]), abs(x0[2 * n + i])))
+    allowed = misfit_allowed(x0, base, one)
     fs, ys, states, x = f.copy(), y.copy(), state.copy(), np.empty(3 * n)
     iterate = (fs, ys, states)
     z, left = np.empty(3 * n), np.empty(3 * n)
     formed, before, turned, started = 0, np.inf, False, False
+    same = _suits(suits, sample, base, one, states)
     for _ in range(MOST_CHORDS):
         if not same:
             if turned or not border(sample, bases, one, law, iterate, kept):
@@ -169,38 +171,31 @@ def kept_step(sample, x0, bases, one, law, node, kept, scratch):  # type: ignore
                 formed += 1
             for i in range(n):
                 suits[sample, i] = 2 * states[i] + base[one, i]
-            k, same = _unknowns(sample, base, one, states, suits, cols, sign)
-            started, turned, before = False, False, np.inf
+            k = unknown_dofs(base, one, states, cols, sign)
+            same, started, turned, before = True, False, False, np.inf
         if not started:
             for r in range(k):
                 z[r] = fs[cols[r]] if sign[r] < 0.0 else ys[cols[r]]
             x[:] = x0
             add_rows(x, -1.0, z, cols, k, Tt, one)
-            _split(x, z, base, one, cols, k, fs, ys)
+            split(x, z, base, one, cols, k, fs, ys)
             started = True
-        _lacks(x, fs, ys, states, base, one, mu, rho_t, cols, k, left)
+        _lacks(x, iterate, mu, rho_t, cols, k, left)
         change = np.dot(inverses[sample, : k * k].reshape(k, k), left[:k])
         for r in range(k):
             z[r] += change[r]
         add_rows(x, -1.0, change, cols, k, Tt, one)
-        _split(x, z, base, one, cols, k, fs, ys)
+        split(x, z, base, one, cols, k, fs, ys)
         worst = judge(fs, ys, mu, rho_n, rho_t, states)
         if not worst < np.inf:
             suits[sample, 0] = -1
             return -1
         for d in range(3 * n):
             allowed = max(allowed, SOLVED * abs(fs[d]))
-        for i in range(n):
-            if suits[sample, i] != 2 * states[i] + base[one, i]:
-                same = False
+        same = _suits(suits, sample, base, one, states)
         if same and worst <= allowed:
-            for i in range(n):
-                state[i] = states[i]
-                for d in (i, n + i, 2 * n + i):
-                    f[d] = 0.0 if states[i] == OPEN else fs[d]
-                    y[d] = ys[d]
-                    if states[i] == STICK or (states[i] == SLIP and d == i):
-                        y[d] = 0.0
+            f[:], y[:], state[:] = fs, ys, states
+            without_rounding(f, y, state)
             return formed
         if same and not worst <= (1.0 - CONTRACTS) * before:
             same, turned = False, True
@@ -208,42 +203,19 @@ def kept_step(sample, x0, bases, one, law, node, kept, scratch):  # type: ignore
     return -1
 
 
-@compiled
-def _unknowns(sample, base, one, state, kept, cols, sign):  # type: ignore[no-untyped-def]
-    """Number of rows, and whether the inverse is for them; dofs and signs overwritten."""
-    n, k, same = len(state), 0, True
-    for i in range(n):
-        if kept[sample, i] != 2 * state[i] + base[one, i]:
-            same = False
-        if state[i] != (OPEN if base[one, i] else STICK):
-            for a in range(1 if state[i] == SLIP and not base[one, i] else 0, 3):
-                cols[k] = a * n + i
-                sign[k] = -1.0 if base[one, i] else 1.0
-                k += 1
-    return k, same
+@inlined
+def _suits(suits, sample, base, one, state):  # type: ignore[no-untyped-def]
+    """Whether the inverse that is kept is one of these states."""
+    same = True
+    for i in range(len(state)):
+        same = same and suits[sample, i] == 2 * state[i] + base[one, i]
+    return same
 
 
 @compiled
-def _split(x, z, base, one, cols, k, f, y):  # type: ignore[no-untyped-def]
-    """Forces and relative motions by what the base fixes and the unknowns; f, y overwritten."""
-    n = base.shape[1]
-    for d in range(3 * n):
-        f[d], y[d] = x[d], 0.0
-        if base[one, d % n]:
-            y[d], f[d] = x[d], 0.0
-    for r in range(k):
-        d = cols[r]
-        if base[one, d % n]:
-            f[d] = z[r]
-        else:
-            y[d] = z[r]
-
-
-@compiled
-def _lacks(  # type: ignore[no-untyped-def]
-    x, f, y, state, base, one, mu, rho_t, cols, k, left
-):
-    """What the rows of `newton_rows` lack at f and y, for the states; `left` is overwritten."""
+def _lacks(x, node, mu, rho_t, cols, k, left):  # type: ignore[no-untyped-def]
+    """What the rows of `newton_rows` lack at an iterate, for its states; `left` is overwritten."""
+    f, y, state = node
     n = len(mu)
     for r in range(k):
         d = cols[r]
@@ -327,13 +299,13 @@ def border(sample, bases, one, law, node, kept):  # type: ignore[no-untyped-def]
     for a in range(common):
         d = was[stay[a]]
         i = d % n
-        _weights(d, node, law, base[one, i], w, o)
+        row_weights(d, node, law, base[one, i], w, o)
         for e in range(added):
             C[stay[a], e] = _entry(w, i, cols[new[e]], Tt, base, one)
     for e in range(added):
         d = cols[new[e]]
         i = d % n
-        _weights(d, node, law, base[one, i], w, o)
+        row_weights(d, node, law, base[one, i], w, o)
         for a in range(common):
             R[e, stay[a]] = _entry(w, i, was[stay[a]], Tt, base, one)
         for a in range(added):
@@ -368,25 +340,6 @@ def border(sample, bases, one, law, node, kept):  # type: ignore[no-untyped-def]
             made[here[a], here[c]] += B[stay[a], stay[c]]
     inverses[sample, : k * k] = made.ravel()
     return True
-
-
-@compiled
-def _weights(d, node, law, open_, w, o):  # type: ignore[no-untyped-def]
-    """Row of a dof: weights of what the base fixes of its node, and of the node's unknowns."""
-    f, y, state = node
-    mu, rho_n, rho_t = law
-    n = len(mu)
-    i, a = d % n, d // n
-    w[:], o[:] = 0.0, 0.0
-    if state[i] != SLIP or a == 0:
-        w[a] = 1.0
-        return
-    t11, t12, t21, t22, v1, v2, _, _ = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
-    t1, t2, v = (t11, t12, v1) if a == 1 else (t21, t22, v2)
-    p, q = (o, w) if open_ else (w, o)
-    p[0], p[1], p[2] = -mu[i] * v, -t1, -t2
-    p[a] += 1.0
-    q[1], q[2] = -rho_t[i] * t1, -rho_t[i] * t2
 
 
 @inlined

@@ -304,10 +304,76 @@ def contact_scratch(n):  # type: ignore[no-untyped-def]
     Returns
     -------
     tuple of ndarray
-        (3 n,) dofs, signs and right sides of its rows; (3, 3 n) rows of a node; (3 n, 3 n) matrix.
+        (3 n,) dofs, signs and right sides of its rows; (3 n, 3 n) matrix.
     """
     cols, sign, b = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
-    return cols, sign, b, np.empty((3, 3 * n)), np.empty((3 * n, 3 * n))
+    return cols, sign, b, np.empty((3 * n, 3 * n))
+
+
+@inlined
+def row_weights(d, node, law, open_, w, o):  # type: ignore[no-untyped-def]
+    """Row of a dof that is not as the base has it: what is zero, or of a slipping node `slip_rows`.
+
+    Parameters
+    ----------
+    d : int
+    node, law : tuple of ndarray
+        As in `contact_step`; the iterate.
+    open_ : bool
+        Whether the base has the node open.
+    w, o : (3,) ndarray
+        Overwritten: weights of what the base fixes of the node, forces where it is closed, and of
+        the node's unknowns.
+
+    Returns
+    -------
+    float
+        Right side.
+    """
+    f, y, state = node
+    mu, rho_n, rho_t = law
+    n = len(mu)
+    i, a = d % n, d // n
+    for e in range(3):
+        w[e], o[e] = 0.0, 0.0
+    if state[i] != SLIP or a == 0:
+        w[a] = 1.0
+        return 0.0
+    t11, t12, t21, t22, v1, v2, q1, q2 = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
+    t1, t2, v = (t11, t12, v1) if a == 1 else (t21, t22, v2)
+    p, q = (o, w) if open_ else (w, o)
+    p[0], p[1], p[2] = -mu[i] * v, -t1, -t2
+    p[a] += 1.0
+    q[1], q[2] = -rho_t[i] * t1, -rho_t[i] * t2
+    return t1 * q1 + t2 * q2
+
+
+@inlined
+def unknown_dofs(base, one, state, cols, sign):  # type: ignore[no-untyped-def]
+    """Dofs that are not as the base has them, node by node, and their signs; both overwritten.
+
+    Parameters
+    ----------
+    base, one
+        As in `contact_step`.
+    state : (n,) ndarray of int
+    cols, sign : (3 n,) ndarray
+        Overwritten: the dofs; -1 where the force is the unknown, 1 where the relative motion is.
+
+    Returns
+    -------
+    int
+        How many.
+    """
+    n, k = len(state), 0
+    for i in range(n):
+        if state[i] != (OPEN if base[one, i] else STICK):
+            # the gap of a node that slips stays closed
+            for a in range(1 if state[i] == SLIP and not base[one, i] else 0, 3):
+                cols[k] = a * n + i
+                sign[k] = -1.0 if base[one, i] else 1.0
+                k += 1
+    return k
 
 
 @inlined
@@ -320,58 +386,84 @@ def newton_rows(x0, bases, one, law, node, scratch):  # type: ignore[no-untyped-
         Rows, that is unknowns.
     """
     base, Tt = bases
-    mu, rho_n, rho_t = law
-    f, y, state = node
-    cols, sign, b, G, H = scratch
-    n, k = len(mu), 0
-    for i in range(n):
-        if state[i] != (OPEN if base[one, i] else STICK):
-            # the gap of a node that slips stays closed
-            for a in range(1 if state[i] == SLIP and not base[one, i] else 0, 3):
-                cols[k] = a * n + i
-                sign[k] = -1.0 if base[one, i] else 1.0
-                k += 1
-    r = 0
-    while r < k:
-        first = 1 if cols[r] >= n else 0
-        i, s = cols[r] - first * n, sign[r]
-        # T is symmetric but for the sign of what couples closed and open
-        for a in range(3):
-            d = a * n + i
-            for j in range(k):
-                G[a, j] = s * sign[j] * Tt[one, d, cols[j]]
-        if state[i] != SLIP:
-            # nothing of what the base takes for an unknown: f of an open node, y of a stuck one
-            for a in range(3):
-                b[r + a] = x0[a * n + i]
+    cols, sign, b, H = scratch
+    n = base.shape[1]
+    k = unknown_dofs(base, one, node[2], cols, sign)
+    w, o = np.empty(3), np.empty(3)
+    first = 0
+    for r in range(k):
+        d = cols[r]
+        i = d % n
+        if r > 0 and cols[r - 1] % n != i:
+            first = r
+        b[r] = row_weights(d, node, law, base[one, i], w, o)
+        for j in range(k):
+            H[r, j] = 0.0
+        for e in range(3):
+            if w[e] != 0.0:
+                b[r] += w[e] * x0[e * n + i]
+                # T is symmetric but for the sign of what couples closed and open
+                weight = w[e] * sign[r]
                 for j in range(k):
-                    H[r + a, j] = G[a, j]
-            r += 3
-            continue
-        t11, t12, t21, t22, v1, v2, q1, q2 = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
-        if first == 0:
-            b[r] = x0[i]
-            for j in range(k):
-                H[r, j] = G[0, j]
-        for a in range(2):
-            row = r + 1 + a - first
-            t1, t2, v = (t11, t12, v1) if a == 0 else (t21, t22, v2)
-            p0, p1, p2 = -mu[i] * v, (1.0 if a == 0 else 0.0) - t1, (1.0 if a == 1 else 0.0) - t2
-            w0, w1, w2, o0, o1, o2 = p0, p1, p2, 0.0, -rho_t[i] * t1, -rho_t[i] * t2
-            if first == 0:
-                w0, w1, w2, o0, o1, o2 = o0, o1, o2, w0, w1, w2
-            b[row] = t1 * q1 + t2 * q2 + w0 * x0[i]
-            b[row] += w1 * x0[n + i]
-            b[row] += w2 * x0[2 * n + i]
-            for j in range(k):
-                H[row, j] = w0 * G[0, j] + w1 * G[1, j] + w2 * G[2, j]
-            if first == 0:
-                H[row, r] = w0 * G[0, r] - o0 + w1 * G[1, r] + w2 * G[2, r]
-            j = r + 1 - first
-            H[row, j] = w0 * G[0, j] + w1 * G[1, j] - o1 + w2 * G[2, j]
-            H[row, j + 1] -= o2
-        r += 3 - first
+                    H[r, j] += weight * sign[j] * Tt[one, e * n + i, cols[j]]
+        for e in range(3):
+            if o[e] != 0.0:
+                H[r, first + e - cols[first] // n] -= o[e]
     return k
+
+
+@inlined
+def split(x, z, base, one, cols, k, f, y):  # type: ignore[no-untyped-def]
+    """Forces and relative motions by what the base fixes and the unknowns.
+
+    Parameters
+    ----------
+    x : (3 n,) ndarray
+        What the base fixes; may be f.
+    z : (k,) ndarray or longer
+        Unknowns of the dofs `cols`.
+    base, one
+        As in `contact_step`.
+    cols : (k,) ndarray of int or longer
+    k : int
+    f, y : (3 n,) ndarray
+        Overwritten.
+    """
+    n = base.shape[1]
+    for d in range(3 * n):
+        if base[one, d % n]:
+            y[d], f[d] = x[d], 0.0
+        else:
+            f[d], y[d] = x[d], 0.0
+    for r in range(k):
+        d = cols[r]
+        if base[one, d % n]:
+            f[d] = z[r]
+        else:
+            y[d] = z[r]
+
+
+@inlined
+def without_rounding(f, y, state):  # type: ignore[no-untyped-def]
+    """Put what the states say is zero to zero; parameters as in `contact_step`."""
+    n = len(state)
+    for i in range(n):
+        if state[i] == OPEN:
+            f[i], f[n + i], f[2 * n + i] = 0.0, 0.0, 0.0
+        else:
+            y[i] = 0.0
+            if state[i] == STICK:
+                y[n + i], y[2 * n + i] = 0.0, 0.0
+
+
+@inlined
+def misfit_allowed(x0, base, one):  # type: ignore[no-untyped-def]
+    """Rounding of the forces of the closed nodes; parameters as in `contact_step`."""
+    n, size = base.shape[1], 0.0
+    for d in range(3 * n):
+        if not base[one, d % n]:
+            size = max(size, abs(x0[d]))
+    return SOLVED * size
 
 
 @inlined
@@ -406,13 +498,9 @@ def contact_step(x0, bases, one, law, node, warm, scratch):  # type: ignore[no-u
     base, Tt = bases
     mu, rho_n, rho_t = law
     f, y, state = node
-    cols, sign, b, _, H = scratch
+    cols, _, b, H = scratch
     n = len(mu)
-    size = 0.0
-    for i in range(n):
-        if not base[one, i]:
-            size = max(size, abs(x0[i]), abs(x0[n + i]), abs(x0[2 * n + i]))
-    allowed = SOLVED * size
+    allowed = misfit_allowed(x0, base, one)
     simple = as_the_base_says(x0, base, one, mu, allowed)
     for i in range(n):
         open_ = base[one, i]
@@ -431,30 +519,15 @@ def contact_step(x0, bases, one, law, node, warm, scratch):  # type: ignore[no-u
         k = newton_rows(x0, bases, one, law, node, scratch)
         if not gauss(H, b, k):
             return -1
-        for d in range(3 * n):
-            f[d], y[d] = x0[d], 0.0
+        put(x0, f, 0)
         add_rows(f, -1.0, b, cols, k, Tt, one)
-        for i in range(n):
-            if base[one, i]:
-                for a in range(3):
-                    y[a * n + i], f[a * n + i] = f[a * n + i], 0.0
-        for j in range(k):
-            if sign[j] < 0.0:
-                f[cols[j]] = b[j]
-            else:
-                y[cols[j]] = b[j]
+        split(f, b, base, one, cols, k, f, y)
         worst = judge(f, y, mu, rho_n, rho_t, state)
         if not worst < np.inf:
             return -1
         for d in range(3 * n):
             allowed = max(allowed, SOLVED * abs(f[d]))
         if worst <= allowed:
-            for i in range(n):
-                if state[i] == OPEN:
-                    f[i], f[n + i], f[2 * n + i] = 0.0, 0.0, 0.0
-                else:
-                    y[i] = 0.0
-                    if state[i] == STICK:
-                        y[n + i], y[2 * n + i] = 0.0, 0.0
+            without_rounding(f, y, state)
             return used
     return -1

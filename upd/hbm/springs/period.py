@@ -6,7 +6,7 @@ import numpy as np
 
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK, normal, step
 from upd.hbm.springs.interval import INPUTS, OUTPUTS, friction_event, normal_corner
-from upd.linalg.compiled import compiled
+from upd.linalg.compiled import compiled, inlined
 
 #: slider start of the march: given positions, middle of the stuck interval, traction at its upper
 #: or lower end along the first tangent
@@ -134,6 +134,31 @@ def _added(row, more):  # type: ignore[no-untyped-def]
         row[m] += more[m]
 
 
+@inlined
+def _add_corners(j, same, jacobian, event, own, first):  # type: ignore[no-untyped-def]
+    """Add the corners of an event before sample j to it and the one before, `same` to that alone.
+
+    `event` has results, their derivatives and these by the coefficients of the motion, `own` the
+    weighed tractions and their tangents, `first` what sample 0 leaves for the last one.
+    """
+    (out, P, rows_new), (weighed, tangent), (corner, corner_tangent) = event, own, first
+    b = j - 1
+    for i in range(len(corner)):
+        if j == 0:
+            corner[i] = out[2 + i]
+        else:
+            weighed[1 + i, b] += out[2 + i]
+        if not same:
+            weighed[1 + i, j] += out[4 + i]
+        if jacobian and np.any(P[2 + i] != 0.0):
+            if j == 0:
+                corner_tangent[i] = rows_new[2 + i]
+            else:
+                _added(tangent[i, b], rows_new[2 + i])
+        if jacobian and not same and np.any(P[4 + i] != 0.0):
+            _added(tangent[i, j], rows_new[4 + i])
+
+
 @compiled
 def march_point(w, E, law, p, start, jacobian, filled):  # type: ignore[no-untyped-def]
     """March one point until its traction repeats.
@@ -161,6 +186,7 @@ def march_point(w, E, law, p, start, jacobian, filled):  # type: ignore[no-untyp
     last1, last2 = np.inf, np.inf
     # the corner before the first sample is shared with the last one, which comes at the end
     corner, corner_tangent = np.zeros(d), np.zeros((d, (1 + d) * size))
+    own = (weighed, tangent)
     for period in range(most):
         same, slider_stays = False, period == 0
         for j in range(n):
@@ -210,20 +236,7 @@ def march_point(w, E, law, p, start, jacobian, filled):  # type: ignore[no-untyp
                     if jacobian:
                         tangent[i, j] = rows_T[i]
             if event:
-                for i in range(d):
-                    if j == 0:
-                        corner[i] = out[2 + i]
-                    else:
-                        weighed[1 + i, b] += out[2 + i]
-                    if not same:
-                        weighed[1 + i, j] += out[4 + i]
-                    if jacobian and np.any(P[2 + i] != 0.0):
-                        if j == 0:
-                            corner_tangent[i] = rows_new[2 + i]
-                        else:
-                            _added(tangent[i, b], rows_new[2 + i])
-                    if jacobian and not same and np.any(P[4 + i] != 0.0):
-                        _added(tangent[i, j], rows_new[4 + i])
+                _add_corners(j, same, jacobian, (out, P, rows_new), own, (corner, corner_tangent))
             if same:
                 break
             # never slipped, closed or opened

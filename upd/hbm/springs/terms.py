@@ -326,6 +326,13 @@ def bordered(compliance, DF, static, D, D_rigid, border):  # type: ignore[no-unt
         A[m + e, n - 1] = normal[m + e]
     A[n - 1, : n - 1] = column
     A[n - 1, n - 1] = last
+    return A, _by_largest(A)
+
+
+@compiled
+def _by_largest(A):  # type: ignore[no-untyped-def]
+    """Divide equations, columns of A (n, n) but the last, by their largest entries: what by."""
+    n = len(A)
     rows = np.zeros(n - 1)
     for col in range(n):
         for i in range(n - 1):
@@ -336,7 +343,7 @@ def bordered(compliance, DF, static, D, D_rigid, border):  # type: ignore[no-unt
     for col in range(n):
         for i in range(n - 1):
             A[col, i] /= rows[i]
-    return A, rows
+    return rows
 
 
 @compiled
