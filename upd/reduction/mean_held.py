@@ -34,7 +34,7 @@ force at the far end balances it, and half of the stretch is seen.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -72,6 +72,13 @@ def motions_left(modes: ArrayLike, held: ArrayLike) -> FloatArray:
     return left
 
 
+class CondenseOptions(TypedDict, total=False):
+    """What else `condense` takes."""
+
+    keep_factor: bool
+    memory_limit_bytes: float | None
+
+
 def condense_held_in_mean(
     K: Any,
     kept: ArrayLike,
@@ -81,7 +88,7 @@ def condense_held_in_mean(
     solver: str = "auto",
     layout: ArrayLike | None = None,
     points: ArrayLike | None = None,
-    **more: Any,
+    **more: Unpack[CondenseOptions],
 ) -> Condensed:
     """Condense a body onto some of its dofs, its rigid motions held in a weighted mean.
 
