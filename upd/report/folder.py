@@ -33,7 +33,6 @@ FIGURES = (
     "pressure",
     "pressure_sections",
     "force_approach",
-    "over_load",
     "stick_slip",
     "traction",
     "hysteresis",

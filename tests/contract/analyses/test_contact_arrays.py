@@ -158,27 +158,12 @@ def test_shares_of_the_approach_and_the_bodies_are_the_results(hertz: RunFolder)
         )
 
 
-def test_quantities_over_the_load_and_their_closed_forms(hertz: RunFolder) -> None:
-    (curve,) = with_content(hertz.arrays, "force-approach")
-    modulus = contact_modulus(E, NU, E, NU)
-    loads = curve["load"].data
-    assert loads[-1] == pytest.approx(F)
-    for name, field in (("contact_area", "area"), ("max_pressure", "max_pressure")):
-        exact = np.array([getattr(hertz_sphere(float(N), RADIUS, modulus), field) for N in loads])
-        assert np.abs(curve[name].data[-1] / exact[-1] - 1.0) < 0.1
-        closed = np.interp(loads, curve["hertz_normal_force"].data, curve[f"hertz_{field}"].data)
-        assert closed[-1] == pytest.approx(exact[-1])
-
-
 def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResult]) -> None:
     found = _folder(folders["symmetric"])
     numbers = {(r["name"], r["case"]): r for r in found.summary["results"]}
     for path in with_content(found.arrays, "path"):
         case = case_of(path)
-        printed = numbers[f"K_T{case.direction}_initial_raw", Case(load=case.load).label]
         assert scalar(path, "friction_limit") == pytest.approx(MU * (case.load or 0.0), rel=1e-14)
-        assert scalar(path, "printed_stiffness") == printed["reference"]
-        assert path["printed_stiffness"].attributes["source"] == printed["source"]
     (curve,) = with_content(found.arrays, "force-approach")
     (first, *_) = with_content(found.arrays, "normal")
     assert scalar(curve, "stiffness") == numbers["K_N_tangent_raw", case_of(first).label]["value"]

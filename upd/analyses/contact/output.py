@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from upd.analyses.contact import faces
 from upd.analyses.contact.faces import corner, lattices
 from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.results import printed_of
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.patch import Patch
 from upd.mesh import recipes
 from upd.reference import hertz_pressure, mindlin
-from upd.results import Case, Group, variable
+from upd.results import Group, variable
 
 Array = NDArray[np.float64]
 Variables = dict[str, Any]
@@ -178,16 +177,14 @@ def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
 
 
 def _curve(solution: ContactSolution) -> Variables:
-    """Force over approach in mm and N, with what goes with the load."""
-    points = solution.curve
-    d, F = (np.array([getattr(p, name) for p in points]) for name in ("approach", "force"))
+    """Force over approach in mm and N."""
+    F, d = (np.array(values) for values in zip(*solution.curve, strict=True))
     if solution.curved:
         # It starts where the faces meet.
         d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
-        own = _approach_over_load(solution, d, F) | _along(solution)
+        own = _approach_over_load(solution, d, F)
     else:
         own = {"stiffness": variable("", solution.normal[0].stiffness, "N/mm")}
-        own |= _printed(solution, "K_N", "_tangent_raw", solution.normal[0].case)
     return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
 
 
@@ -202,48 +199,18 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
     hertz = [h for load in force[1:] if (h := solution.hertz_of(float(load))) is not None]
     if hertz:
         out["hertz_normal_force"] = variable("hertz_point", force, "N")
-        for name, unit in (("area", "mm2"), ("max_pressure", "MPa"), ("approach", "mm")):
-            closed = np.array([0.0, *(getattr(h, name) for h in hertz)])
-            out[f"hertz_{name}"] = variable("hertz_point", closed, unit)
+        closed = np.array([0.0, *(h.approach for h in hertz)])
+        out["hertz_approach"] = variable("hertz_point", closed, "mm")
     return out
-
-
-def _along(solution: ContactSolution) -> Variables:
-    """Contact area and largest pressure at the loaded points."""
-    points, dims = solution.curve, "loaded_point"
-    return {
-        "load": variable(dims, [p.force for p in points], "N"),
-        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
-        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
-    }
 
 
 # -- of flat faces ---------------------------------------------------------------------------------
 
 
 def _limit(solution: ContactSolution, path: LoadPath) -> Variables:
-    """Load of gross slip, and the printed stiffness."""
+    """Load of gross slip."""
     limit = solution.plan.scene.contact.friction * (path.case.load or 0.0)
-    name = f"K_T{path.case.direction}"
-    return {
-        "friction_limit": variable("", limit, "N"),
-        **_printed(solution, name, "_initial_raw", path.case),
-    }
-
-
-def _printed(solution: ContactSolution, name: str, total: str, case: Case) -> Variables:
-    """The printed stiffness of the whole contact, where one is; one printed of a pad goes with all
-    of them.
-    """
-    look_up = printed_of(solution.plan.scene)
-    whole, pad = (look_up(name + suffix, case.given()) for suffix in (total, "_per_pad"))
-    if whole:
-        return {"printed_stiffness": variable("", whole[0].value, "N/mm", source=whole[0].source)}
-    if pad:
-        n = len(lattices(solution))
-        source = f"{pad[0].source}, {n} pads"
-        return {"printed_stiffness": variable("", n * pad[0].value, "N/mm", source=source)}
-    return {}
+    return {"friction_limit": variable("", limit, "N")}
 
 
 def _laws(solution: ContactSolution) -> dict[str, Group]:

@@ -158,7 +158,7 @@ class ContactSolution:
     Attributes
     ----------
     curve
-        Loaded points of the force-approach curve.
+        Loaded points of the force-approach curve, N and mm.
     paths
         Tangential force over displacement, cycles among them.
     no_shares
@@ -172,7 +172,7 @@ class ContactSolution:
     plan: ContactPlan
     model: ContactModel
     normal: list[NormalCase] = field(default_factory=list)
-    curve: list[NormalCase] = field(default_factory=list)
+    curve: list[tuple[float, float]] = field(default_factory=list)
     tangential: list[TangentialCase] = field(default_factory=list)
     paths: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""

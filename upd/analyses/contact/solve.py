@@ -92,15 +92,11 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
-        solution.normal, solution.curve = (
-            [
-                NormalCase(
-                    **vars(found[F]), force=F, measures=measured(solution, found[F].solution, F)
-                )
-                for F in loads
-            ]
-            for loads in (wanted, curve)
-        )
+        solution.curve = [(F, found[F].solution.approach) for F in curve]
+        solution.normal = [
+            NormalCase(**vars(found[F]), force=F, measures=measured(solution, found[F].solution, F))
+            for F in wanted
+        ]
         for body in _bodies_alone(solution):
             alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
