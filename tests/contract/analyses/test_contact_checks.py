@@ -303,12 +303,6 @@ def test_a_spoiled_answer_fails_exactly_its_check(analysis: str, toy: str, name:
     assert failures(toy, solution) - before == {name} - before
 
 
-def test_an_effect_left_out_without_its_check_fails() -> None:
-    solution = fresh("damper")
-    solution.left_out = [one for one in solution.left_out if one.effect != left_out.TILT]
-    assert failures("damper", solution) == {left_out.TILT}
-
-
 def test_every_check_of_a_contact_has_a_spoiler() -> None:
     names = {
         check.name

@@ -17,7 +17,7 @@ from upd.analyses.base import conditions
 from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
 from upd.analyses.contact.faces import lattices, on_lines, rim_nodes, tractions
-from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
+from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
@@ -212,7 +212,10 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
     remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
-    remedy += wider_patch(solution.plan.scene, needed)
+    if recipes.has_parameter(solution.plan.scene.recipe, "patch"):
+        remedy += f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
+    else:
+        remedy += f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
     nodes = rim_nodes(solution, case)
     return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
 
@@ -386,14 +389,7 @@ def check_solution(solution: ContactSolution) -> list[Check]:
     checks += yield_checks(solution)
     checks += _left_out_checks(solution)
     checks += _curved_checks(solution) if solution.curved else [_flat_resolution_check(solution)]
-    missing = set(solution.plan.shown) - {c.name for c in checks}
-    return [
-        *checks,
-        *(
-            Check(name, NO_CASE, 1, 0, f"the check of {name} was not made", "report this scene")
-            for name in sorted(missing)
-        ),
-    ]
+    return checks
 
 
 def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:

@@ -34,9 +34,9 @@ from upd.contact.checks import few_threads
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
-from upd.contact.tangential import TangentialContact, TangentialPath
+from upd.contact.tangential import TangentialPath
 from upd.contact.tilt import tilted_contact
-from upd.errors import InputError, UpdError
+from upd.errors import UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
 from upd.results import quantities as q
@@ -361,37 +361,32 @@ class Frozen:
 
         Raises ConvergenceError where a product does not converge.
         """
-        scene, model = self.solution.plan.scene, self.solution.model
-        n = len(model.gap)
-        at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
+        settled(self.solution.model, self.components, self._tractions, lambda found: found)
 
-        def whole(tractions: Array) -> Array:
-            """Tractions at the loaded nodes, on all nodes; column by column."""
-            out = np.zeros((n * len(self.components), *tractions.shape[1:]))
-            out[at] = tractions
-            return out.reshape(len(out), -1)
-
-        def shown(solve: Callable[[], Array], limit: float = KNOWN) -> None:
-            settled(model, self.components, solve, lambda found: [(whole(found), limit)])
-
-        def single(load: Array) -> TangentialContact:
-            target = load if len(load) == 2 else float(load[0])
-            return tangential_contact(self.compliance, self.limit, load=target)
-
-        def both(found: TangentialContact) -> Iterable[tuple[Array, float]]:
-            yield whole(found.force), KNOWN
-            if found.rates is not None:
-                yield whole(found.rates), KNOWN_STIFFNESS
-
-        shown(lambda: self._moved(self.compliance)[0], KNOWN_STIFFNESS)
-        gross = np.zeros(len(self.components) * len(self.limit))
+    def _tractions(self) -> list[tuple[Array, float]]:
+        """Tractions on all nodes, column by column, and the largest share of them that may be
+        unknown: stuck, in gross slip, of every load with its rates, of the cycle.
+        """
+        scene, C = self.solution.plan.scene, self.compliance
+        gross = np.zeros(len(C))
         gross[: len(self.limit)] = self.limit
-        shown(lambda: gross)
+        found = [(self._moved(C)[0], KNOWN_STIFFNESS), (gross, KNOWN)]
         for ratio in scene.loads.tangential if scene.wants("tangential") else ():
-            settled(model, self.components, partial(single, ratio * self.total * self.unit), both)
+            target = ratio * self.total * (self.unit if len(self.unit) == 2 else self.unit[0])
+            one = tangential_contact(C, self.limit, load=target)
+            found.append((one.force, KNOWN))
+            found += [(one.rates, KNOWN_STIFFNESS)] if one.rates is not None else []
         if scene.wants("cycle"):
             shares, _ = loading.cycle_shares(self.loads.cycle_steps, self.loops)
-            shown(lambda: self._path(self.loads.cycle_amplitude * shares).force.T)
+            found.append((self._path(self.loads.cycle_amplitude * shares).force.T, KNOWN))
+        n = len(self.solution.model.gap)
+        at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
+        out = []
+        for tractions, limit in found:
+            whole = np.zeros((n * len(self.components), *tractions.shape[1:]))
+            whole[at] = tractions
+            out.append((whole, limit))
+        return out
 
     def _spread(self, values: Array) -> Array:
         """(n, 1 or 2) of values at the loaded nodes."""
@@ -471,11 +466,6 @@ _SWITCHES: Mapping[str, tuple[str, object]] = {
     planned.COUPLING: ("contact.coupling", "coupled"),
     planned.DIRECTIONS: ("contact.directions", 2),
 }
-#: of a damper that tips over when its tilt is free
-_TIPS = (
-    "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
-    "contact.load_point inside the contact, or choose another contact.distant set"
-)
 
 
 def solve_left_out(solution: ContactSolution, stages: Stages) -> None:
@@ -493,34 +483,27 @@ def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Res
         model = prepare(companion, Stages(), "companion")
         without = _numbers(companion, model)
     for effect in solution.plan.shown:
-        included, remedy = dict[Key, float](), ""
-        try:
+        included = dict[Key, float]()
+        with suppress(UpdError, np.linalg.LinAlgError):
             if model is not None:
-                included = {(r.name, r.case): r.value for r in _with(effect, companion, model)}
-        except InputError:
-            remedy = _TIPS
-        except (UpdError, np.linalg.LinAlgError):
-            pass
-        yield from _changes(effect, without, included, remedy)
+                found = _numbers(companion, model, _SWITCHES[effect])
+                included = {(r.name, r.case): r.value for r in found}
+        yield from _changes(effect, without, included)
 
 
 def _changes(
-    effect: str, without: Sequence[Result], included: Mapping[Key, float], remedy: str
+    effect: str, without: Sequence[Result], included: Mapping[Key, float]
 ) -> Iterator[Resolved]:
-    """The numbers that an effect changes; NaN where none was found with it.
-
-    A body that tips over has neither stiffness nor approach: 0 N/mm, or NaN.
-    """
+    """The numbers that an effect changes; NaN where none was found with it."""
     areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
     known = [r for r in without if (r.name, r.case) in included or not included]
     had = {r.name for r in known}
     names = next((row for row in _SHOWN[effect] if had.intersection(row)), ())
     names += _AREAS if effect == planned.COUPLING else ()
     for r in (one for one in known if one.name in names):
-        none = 0.0 if remedy and r.unit == "N/mm" else float("nan")
-        value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
+        value, area = included.get((r.name, r.case), float("nan")), areas.get(r.case.load, 0.0)
         over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
-        yield Resolved(effect, r.name, r.case, r.value, value, r.unit, remedy, over=over)
+        yield Resolved(effect, r.name, r.case, r.value, value, r.unit, over=over)
 
 
 def _under_load(found: Sequence[Result]) -> list[Result]:
@@ -533,11 +516,3 @@ def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]
     switched = replace(plan, scene=changed(plan.scene, switch))
     with few_threads(model.gap):
         return _under_load(make_results(solve_plan(switched, Stages(), model)))
-
-
-def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:
-    """The companion's numbers with an effect; InputError where its upper body tips over."""
-    if effect == planned.TILT and plan.scene.coupled:
-        # with friction it would not
-        _numbers(plan, model, _SWITCHES[effect], ("contact.coupling", "uncoupled"))
-    return _numbers(plan, model, _SWITCHES[effect])

@@ -36,10 +36,10 @@ from upd.analyses.contact.plan import (
     auto_patch,
     hertz_radius,
     is_curved,
+    make_plan,
     refined_growth,
 )
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_normal, solve_plan, solve_tangential
 from upd.analyses.cost import NODES
