@@ -148,7 +148,6 @@ APPROACH_FINITE_BODY = Quantity(
     source="solved for, without the mesh's error",
 )
 APPROACH_WITHIN_3A = Quantity("approach_within_3a", "um", "approach within 3a (thesis 6.5)")
-COMPRESSION_3A = Quantity("compression_3a_{n}", "um", "{n} beyond 3a")
 K_N_TANGENT = Quantity("K_N_tangent", "N/mm", "K_N tangent, bulk compliance removed")
 K_N_SECANT = Quantity("K_N_secant", "N/mm", "K_N secant, bulk compliance removed")
 K_N_TANGENT_3A = Quantity("K_N_tangent_3a", "N/mm", "K_N tangent, approach within 3a (thesis 6.5)")
@@ -169,10 +168,8 @@ MISFIT = Quantity("traction_misfit_L2", words="traction misfit (L2)", is_error=T
 F_N = Quantity("F_N", "N", "normal force F_N")
 F_T = Quantity("F_T", "N", "tangential force F_T")
 F_N_OTHER_FACE = Quantity("F_N_other_face", "N", "normal force on the other face")
-APPROACH_OF = Quantity("approach_{n}", "um", "approach, {n}'s share")
 TILT_ABOUT_Y = Quantity("tilt_about_y", "urad", "tilt along x")
 TILT_ABOUT_X = Quantity("tilt_about_x", "urad", "tilt along y")
-K_N_BONDED = Quantity("K_N_bonded", "N/mm", "K_N if nothing could open")
 K_T_ALL_STUCK = Quantity("K_T{n}_initial_raw", "N/mm", "K_T along {n}, all stuck")
 K_N_ALONE = Quantity("K_N_{n}_alone", "N/mm")
 K_N_DAMPER_ALONE = Quantity("K_N_damper_alone", "N/mm", "K_N, platform rigid")

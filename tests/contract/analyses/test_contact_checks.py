@@ -20,7 +20,7 @@ import pytest
 import upd
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.contact import plan as left_out
-from upd.analyses.contact.loading import Sheared
+from upd.analyses.contact.solution import Sheared
 from upd.progress import Stages
 from upd.results import Check
 from upd.scene import as_scene

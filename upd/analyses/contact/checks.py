@@ -14,13 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import conditions
-from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.faces import lattices, on_lines, rim_nodes, tractions
 from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    LoadPath,
+    NormalCase,
+    Sheared,
+    TangentialCase,
+    as_normal,
+    contact_points_of,
+    opened_by_shear,
+    shear_nodes,
+    tangential_compliance,
+    tilt_arms,
+)
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
+from upd.contact.patch import Patch
 from upd.contact.subsurface import most_stressed, partial_slip_ratio
 from upd.mesh import recipes
 from upd.reference import hertz_yield_load, hertz_yield_point
@@ -103,7 +114,7 @@ def normal_checks(
     ]
 
 
-def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> list[Check]:
+def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check]:
     """Coulomb's law node by node, and the balance, after one tangential load step.
 
     The slip is made again from the compliance, dw = d - C t - w_before: none where a node sticks;
@@ -111,7 +122,7 @@ def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> li
     (K. L. Johnson, Contact Mechanics, 1985, section 7.2).
     """
     n, k = len(t.loaded), len(t.components)
-    C = loading.tangential_compliance(model, t.components, t.loaded)
+    C = tangential_compliance(model, t.components, t.loaded)
     allowed, diagonal = rounding(k * n), np.diagonal(C)
     force = t.force.reshape(k, n)
     row = np.sqrt(diagonal * diagonal.max())
@@ -145,7 +156,7 @@ def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> li
     )
 
 
-def _loop_check(path: loading.LoadPath) -> Check:
+def _loop_check(path: LoadPath) -> Check:
     """Area of a cycle's loop against the work of slip."""
     error = abs(path.loop_area / path.slip_work - 1.0) if path.slip_work else path.loop_area
     remedy = "the loop is drawn with too few steps: raise loads.cycle_steps"
@@ -216,7 +227,7 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
         remedy += f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
     else:
         remedy += f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
-    nodes = rim_nodes(solution, case)
+    nodes = solution.rim_nodes(case)
     return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
 
 
@@ -245,7 +256,7 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     nodes lie as near as those of two and four hex8i, it is 0.8 % too high and 0.9 % too low.
     """
     edges: list[tuple[int, str]] = []
-    for k in lattices(solution).values():
+    for k in solution.lattices.values():
         lines = (len(k.Y) - 1, len(k.X) - 1)
         if k.quads is not None:
             # of a square of as many elements
@@ -309,13 +320,13 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
     ]
     for t in solution.tangential:
         shear = np.zeros((2, len(t.pressed)))
-        shear[list(t.nodes.components)] = tractions(solution, t)
+        shear[list(t.nodes.components)] = solution.tractions(t)
         closed = solution.closed_form_traction(t) is not None
         fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
         loads.append((t, t.normal.force, closed, fields))
     for one, force, closed, fields in loads if limited else ():
         by_hertz = closed and solution.hertz_of(force) is not None
-        faces = [] if by_hertz else [on_lines(k, fields) for k in lattices(solution).values()]
+        faces = [] if by_hertz else [on_lines(k, fields) for k in solution.lattices.values()]
         for body in limited:
             limit = scene.materials[body.name].yield_stress
             assert limit is not None
@@ -349,6 +360,24 @@ def _hertz_stress(
     # friction never relieves the most stressed place
     stress = max(ratio, worst.ratio) * hertz.max_pressure
     return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
+
+
+def on_lines(patch: Patch, fields: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
+    """Lattice lines and fields of the model's nodes on them; without lines on as many even ones as
+    there are nodes, linear between the nodes and zero off the patch.
+    """
+    whole = [patch.whole(one) for one in fields]
+    if patch.quads is None:
+        return patch.X, patch.Y, whole
+    # slow to import: only where it is called
+    from scipy.interpolate import LinearNDInterpolator
+
+    points = patch.points()
+    n = int(np.ceil(np.sqrt(len(points))))
+    x, y = (np.linspace(v.min(), v.max(), n) for v in points.T)
+    between = LinearNDInterpolator(points, np.column_stack(whole), 0.0)
+    found = between(*np.meshgrid(x, y, indexing="ij"))
+    return x, y, list(np.moveaxis(found, -1, 0))
 
 
 def _half_space_stress(
@@ -400,17 +429,17 @@ def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
     if solution.curved:
         checks += product_checks(model, case, (NORMAL,), force)
         checks.append(_resolution_check(solution, one))
-    arms = loading.tilt_arms(plan, model)
+    arms = tilt_arms(plan, model)
     turned = np.zeros(len(force)) if one.tilt is None else arms @ one.tilt
     if one.state is not None:
-        nodes = loading.shear_nodes(model, plan.scene.contact.friction, one.state)
+        nodes = shear_nodes(model, plan.scene.contact.friction, one.state)
         checks += tangential_checks(case, model, nodes)
-        turned = turned - loading.opened_by_shear(model, one.state)
+        turned = turned - opened_by_shear(model, one.state)
     carried = plan.copies * float(force.sum())
     checks += normal_checks(case, one.force, one.solution, model, carried, turned, one.reaction)
     if one.tilt is None:
         return checks
-    length = float(np.ptp(loading.contact_points_of(model)[:, :2], axis=0).max())
+    length = float(np.ptp(contact_points_of(model)[:, :2], axis=0).max())
     moment = float(np.abs(arms.T @ force).max()) / (float(force.sum()) * length)
     what = "moment about the load line / (F patch length)"
     return [*checks, *conditions(case, "report this", ("moment balance", moment, 1e-8, what))]
@@ -421,9 +450,9 @@ def _tangential(solution: ContactSolution, t: TangentialCase) -> list[Check]:
     plan, model = solution.plan, solution.model
     checks = tangential_checks(t.case, model, t.nodes)
     if t.state is not None:
-        answer = loading.as_normal(t.state, float("nan"))
-        turned = loading.tilt_arms(plan, model) @ t.state.motion[3:]
-        turned -= loading.opened_by_shear(model, t.state)
+        answer = as_normal(t.state, float("nan"))
+        turned = tilt_arms(plan, model) @ t.state.motion[3:]
+        turned -= opened_by_shear(model, t.state)
         carried = float(answer.unclipped.sum())
         checks += normal_checks(t.case, t.normal.force, answer, model, carried, turned)
     if solution.curved:

@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact import faces
-from upd.analyses.contact.faces import corner, lattices
-from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.results import contact_law
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    LoadPath,
+    NormalCase,
+    TangentialCase,
+)
 from upd.contact.patch import Patch
 from upd.mesh import recipes
-from upd.reference import hertz_pressure, mindlin
+from upd.reference import mindlin
 from upd.results import Group, variable
 
 Array = NDArray[np.float64]
@@ -29,17 +32,14 @@ _BEYOND = 1.3
 
 
 def sizes(solution: ContactSolution) -> dict[str, int]:
-    """Contact pairs of the model and of all patches, mirror images included."""
-    return {
-        "n_pairs": len(solution.model.gap),
-        "n_pairs_whole_patch": sum(k.area().size for k in lattices(solution).values()),
-    }
+    """Contact pairs of the model."""
+    return {"n_pairs": len(solution.model.gap)}
 
 
 def arrays(solution: ContactSolution) -> dict[str, Group]:
     """Fields of every case and patch with their closed forms; curves, paths and contact points."""
     out: dict[str, Group] = {}
-    patches, (x, y) = lattices(solution), corner(solution)
+    patches, (x, y) = solution.lattices, solution.corner
     for patch, k in patches.items():
         face: dict[str, str] = {"patch": patch} if len(patches) > 1 else {}
         # Without a lattice every node has its own x and y.
@@ -79,7 +79,7 @@ def _normal(solution: ContactSolution, k: Patch, case: NormalCase) -> Variables:
     if case.state is not None:
         traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
         out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
-    return out | _approach_split(case) | _hertz(solution, case) if solution.curved else out
+    return out | _hertz(solution, case)
 
 
 def _sheared(
@@ -96,7 +96,7 @@ def _sheared(
 
 
 def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Variables:
-    traction, XY = faces.tractions(solution, t), _dims(k)
+    traction, XY = solution.tractions(t), _dims(k)
     out = _sheared(k, traction, list(t.slip.T), t.stick)
     if solution.curved and len(traction) == 1:
         # One direction has no dimension of its own.
@@ -112,27 +112,13 @@ def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Varia
 # -- closed forms ----------------------------------------------------------------------------------
 
 
-def _approach_split(case: NormalCase) -> Variables:
-    """The approach, and what the bodies add to it."""
-    out: Variables = {"approach": variable("", case.approach, "mm")}
-    if case.shares:
-        words = "approach of the finite, held bodies"
-        out["finite_body"] = variable("", case.finite_body, "mm", words)
-    return out
-
-
 def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
     hertz = solution.hertz_of(case.force)
     if hertz is None:
         return {}
-    x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
-    pressure = hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure)
     return {
         "hertz_radius": variable("", hertz.radius, "mm"),
-        "hertz_approach": variable("", hertz.approach, "mm"),
         "hertz_max_pressure": variable("", hertz.max_pressure, "MPa"),
-        "hertz_x": variable("hertz_x", x, "mm"),
-        "hertz_pressure": variable("hertz_x", pressure, "MPa"),
     }
 
 
@@ -220,10 +206,10 @@ def _laws(solution: ContactSolution) -> dict[str, Group]:
     scene = solution.plan.scene
     out: dict[str, Group] = {}
     for case in solution.normal if scene.wants("contact_law") else ():
-        law = faces.contact_law(solution, case)
+        law = contact_law(solution, case)
         if law is not None:
             placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
-            at = law.position[:, :2] - corner(solution)
+            at = law.position[:, :2] - solution.corner
             places = {
                 f"report_{axis}": variable("contact_point", at[:, k], "mm")
                 for k, axis in enumerate("xy")

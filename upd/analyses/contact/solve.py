@@ -17,17 +17,29 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.base import Resolved, keeping
-from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
-from upd.analyses.contact.faces import measured
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import (
+    LOAD_STEP,
     ContactSolution,
+    CoupledState,
+    LoadPath,
     NormalCase,
     PressedContact,
+    Sheared,
     TangentialCase,
+    as_normal,
+    cycle_shares,
+    loads_along,
+    measured,
+    raised,
+    shear_nodes,
+    sheared,
+    slope,
+    tangential_compliance,
+    tilt_arms,
 )
 from upd.contact import tangential_contact, tangential_path
 from upd.contact.checks import few_threads
@@ -88,7 +100,7 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     plan = solution.plan
     wanted = list(planned.normal_loads(plan.scene))
     curve = _curve_loads(plan, max(wanted), solution.curved)
-    steps = (-loading.LOAD_STEP, 0.0, loading.LOAD_STEP) if _by_slope(solution) else ()
+    steps = (-LOAD_STEP, 0.0, LOAD_STEP) if _by_slope(solution) else ()
     around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
@@ -142,7 +154,7 @@ def press(
     distinct = sorted(set(forces))
     if plan.scene.coupled:
         return _sheared_too(solution, distinct, body)
-    loads, arms = [F / plan.copies for F in distinct], loading.tilt_arms(plan, model)
+    loads, arms = [F / plan.copies for F in distinct], tilt_arms(plan, model)
     if solution.curved:
         show_normal(model, loads)
 
@@ -164,10 +176,10 @@ def press(
         found = [PressedContact(one, plan.copies * one.stiffness) for one in answers]
     out = dict(zip(distinct, found, strict=True))
     for F in distinct if _by_slope(solution) else ():
-        ends = [out.get(F * (1.0 + s)) for s in (-loading.LOAD_STEP, loading.LOAD_STEP)]
+        ends = [out.get(F * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP)]
         if F > 0.0 and ends[0] and ends[1]:
             moved = ends[1].solution.approach - ends[0].solution.approach
-            out[F].stiffness = 2.0 * loading.LOAD_STEP * F / moved
+            out[F].stiffness = 2.0 * LOAD_STEP * F / moved
     return out
 
 
@@ -178,20 +190,20 @@ def _sheared_too(
     where it is known.
     """
     model, mu = solution.model, solution.plan.scene.contact.friction
-    arms = loading.tilt_arms(solution.plan, model)
-    states = loading.raised(model, mu, forces, arms, body=body)
+    arms = tilt_arms(solution.plan, model)
+    states = raised(model, mu, forces, arms, body=body)
     # no load: friction has nothing to hold
     none = partial(normal_contact, model.compliance(NORMAL), model.gap, load=0.0)
     out = {F: PressedContact(none(), 0.0) for F in forces if not F > 0.0}
     for F, state in states.items():
-        sloped = all(F * (1.0 + s) in states for s in (-loading.LOAD_STEP, loading.LOAD_STEP))
-        free = loading.slope(states, F) if sloped else float("nan")
+        sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
+        free = slope(states, F) if sloped else float("nan")
         held = free
         if arms.size and sloped and body is None:
             # dF/d approach with the tilts held and the states kept, shifts following
             held = float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
         tilt = state.motion[3:] if arms.size else None
-        out[F] = PressedContact(loading.as_normal(state, held), free, state, tilt)
+        out[F] = PressedContact(as_normal(state, held), free, state, tilt)
     return out
 
 
@@ -240,7 +252,7 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shar
     for ratios in marches:
         load, moved, at = way.march(ratios)
         if not solution.curved:
-            solution.paths.append(loading.LoadPath(own, load, moved))
+            solution.paths.append(LoadPath(own, load, moved))
         for ratio in (r for r in loads if r in ratios):
             solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
     if scene.wants("cycle"):
@@ -275,8 +287,8 @@ class Frozen:
         displacement: float,
         K: Array,
         fields: tuple[Array, Array],
-        nodes: loading.Sheared,
-        state: loading.CoupledState | None = None,
+        nodes: Sheared,
+        state: CoupledState | None = None,
     ) -> TangentialCase:
         """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
         # with the motion across the load held, or free to follow; 0 where nothing holds
@@ -293,7 +305,7 @@ class Frozen:
     @property
     def compliance(self) -> Array:
         """Of the loaded nodes; it changes while bodies learn."""
-        return loading.tangential_compliance(self.solution.model, self.components, self.loaded)
+        return tangential_compliance(self.solution.model, self.components, self.loaded)
 
     def _moved(self, compliance: Array) -> tuple[Array, float]:
         """Tractions of stuck nodes that move by one along the direction, T = e' C^-1 e."""
@@ -307,7 +319,7 @@ class Frozen:
         for body in (model.upper, model.lower):
             if body.name in self.case.alone:
                 on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
-                C = loading.tangential_compliance(model, self.components, on, body)
+                C = tangential_compliance(model, self.components, on, body)
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
@@ -334,9 +346,7 @@ class Frozen:
         before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
         d, stick = np.atleast_1d(path.displacement[k]), path.state[k] == 0
         load, force = ratio * self.total * self.unit, path.unclipped[k]
-        nodes = loading.Sheared(
-            self.components, self.loaded, self.limit, force, before, d, load, stick
-        )
+        nodes = Sheared(self.components, self.loaded, self.limit, force, before, d, load, stick)
         fields = self._spread(path.force[k]), self._spread(path.slip[k])
         K = np.atleast_2d(path.stiffness[k])
         return self._found(ratio, float(d @ self.unit), K, fields, nodes)
@@ -348,13 +358,13 @@ class Frozen:
         path = self._path(shares)
         return *self._along(path), self.copies * path.slip_work
 
-    def cycle(self, case: Case) -> loading.LoadPath:
+    def cycle(self, case: Case) -> LoadPath:
         """First loading to +T*, then closed loops +T* -> -T* -> +T*, of which the last counts."""
-        shares, begin = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+        shares, begin = cycle_shares(self.loads.cycle_steps, self.loops)
         T, d, work = self.loop(self.loads.cycle_amplitude * shares)
         area = abs(float(np.trapezoid(T[begin:], d[begin:])))
         slip_work = float(work[begin:].sum())
-        return loading.LoadPath(case, T, d, True, slip_work, area)
+        return LoadPath(case, T, d, True, slip_work, area)
 
     def learn(self) -> None:
         """Show bodies that learn the tractions of every tangential load and of the cycle.
@@ -377,7 +387,7 @@ class Frozen:
             found.append((one.force, KNOWN))
             found += [(one.rates, KNOWN_STIFFNESS)] if one.rates is not None else []
         if scene.wants("cycle"):
-            shares, _ = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+            shares, _ = cycle_shares(self.loads.cycle_steps, self.loops)
             found.append((self._path(self.loads.cycle_amplitude * shares).force.T, KNOWN))
         n = len(self.solution.model.gap)
         at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
@@ -409,9 +419,9 @@ class _Coupled(Frozen):
     def stuck(self) -> tuple[float, dict[str, float]]:
         """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
 
-        def secant(state: loading.CoupledState) -> float:
+        def secant(state: CoupledState) -> float:
             size = SMALL_SHEAR * self.friction * float(state.found.load[-1, 0])
-            return size / float(loading.sheared(state, np.array([size]), self.unit, size)[1][0])
+            return size / float(sheared(state, np.array([size]), self.unit, size)[1][0])
 
         alone = {name: one.state for name, one in self.case.alone.items()}
         of = {name: secant(state) for name, state in alone.items() if state is not None}
@@ -420,15 +430,13 @@ class _Coupled(Frozen):
     def march(self, ratios: Array) -> Marched:
         """Shares of mu N one after the other; friction remembers the normal load."""
         needed = max(self.loads.tangential, default=0.0) * self.total
-        states, moved = loading.sheared(self.state, ratios * self.total, self.unit, needed)
+        states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
         return load, np.insert(moved, 0, 0.0), partial(self._to, states, moved)
 
-    def _to(
-        self, states: list[loading.CoupledState], moved: Array, k: int, ratio: float
-    ) -> TangentialCase:
+    def _to(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
         state = states[k]
-        nodes = loading.shear_nodes(self.solution.model, self.friction, state)
+        nodes = shear_nodes(self.solution.model, self.friction, state)
         slip = np.zeros((len(state.force), 2))
         slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
         fields = state.force[:, 1:], slip
@@ -437,7 +445,7 @@ class _Coupled(Frozen):
     def loop(self, shares: Array) -> tuple[Array, Array, Array]:
         """The same; friction remembers the normal load."""
         values, before = shares * self.total, self.state.found.history
-        found = self.state.found.go_on(load=loading.loads_along(self.state, values, self.unit))
+        found = self.state.found.go_on(load=loads_along(self.state, values, self.unit))
         moved = (found.displacement[:, 1:3] - before.motion[1:3]) @ self.unit
         return np.insert(values, 0, 0.0), np.insert(moved, 0, 0.0), found.friction_loss(before)
 

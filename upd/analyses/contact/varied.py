@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Plan
 from upd.analyses.contact.bodies import held_sets
-from upd.analyses.contact.faces import rim_nodes
 from upd.analyses.contact.plan import (
     ContactPlan,
     auto_patch,
@@ -384,7 +383,7 @@ def _values(
     try:
         solve_normal(near, Stages())
         (one,) = near.normal
-        if rim_nodes(near, one):
+        if near.rim_nodes(one):
             return []
         one.shares = {body: s.over(case.force / load) for body, s in case.shares.items()}
         one.shear_shares = case.shear_shares
@@ -423,8 +422,6 @@ _NUMBERS = (
     "K_N_secant_raw",
     "K_Tx_initial_raw",
     "K_Ty_initial_raw",
-    "approach_damper",
-    "approach_platform",
     "law_k_n",
     "cycle_energy",
 )
