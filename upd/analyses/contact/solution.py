@@ -157,40 +157,22 @@ class CoupledState:
 
 
 @dataclass
-class PressedContact:
-    """Answer of both bodies under a normal load, or of one pressed by a rigid counterpart.
-
-    Attributes
-    ----------
-    stiffness
-        Tangent normal stiffness of the whole contact, N/mm.
-    state
-        With normal and tangential contact at once, the state it comes from.
-    tilt
-        (2,) free tilts in rad; None where they are held.
-    """
-
-    solution: NormalContact
-    stiffness: float
-    state: CoupledState | None = None
-    tilt: Array | None = None
-
-    @property
-    def stick(self) -> NDArray[np.bool_]:
-        """(n,) nodes that stick without a tangential load: all in contact, if pressure does not
-        shear.
-        """
-        return self.solution.contact if self.state is None else self.state.stick
-
-
-@dataclass(kw_only=True)
-class NormalCase(PressedContact):
-    """One normal load on the whole contact.
+class NormalCase:
+    """One normal load on the whole contact, of both bodies or of one pressed by a rigid
+    counterpart.
 
     Attributes
     ----------
     force
         N on the whole contact.
+    stiffness
+        Tangent normal stiffness of the whole contact, N/mm.
+    measures
+        Size and pressure of the contact.
+    state
+        With normal and tangential contact at once, the state it comes from.
+    tilt
+        (2,) free tilts in rad; None where they are held.
     alone
         By body: its answer at the same load, pressed by a rigid counterpart, where a stiffness
         calls for it.
@@ -208,8 +190,12 @@ class NormalCase(PressedContact):
     """
 
     force: float
+    solution: NormalContact
+    stiffness: float
     measures: ContactMeasures
-    alone: dict[str, PressedContact] = field(default_factory=dict)
+    state: CoupledState | None = None
+    tilt: Array | None = None
+    alone: dict[str, NormalCase] = field(default_factory=dict)
     stuck: dict[float, tuple[float, dict[str, float]]] = field(default_factory=dict)
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
@@ -221,6 +207,13 @@ class NormalCase(PressedContact):
     def case(self) -> Case:
         """The load, with as many digits as distinguish the scene's loads."""
         return Case(load=self.force)
+
+    @property
+    def stick(self) -> NDArray[np.bool_]:
+        """(n,) nodes that stick without a tangential load: all in contact, if pressure does not
+        shear.
+        """
+        return self.solution.contact if self.state is None else self.state.stick
 
     @property
     def approach(self) -> float:

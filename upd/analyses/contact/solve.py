@@ -27,7 +27,6 @@ from upd.analyses.contact.solution import (
     CoupledState,
     LoadPath,
     NormalCase,
-    PressedContact,
     Sheared,
     TangentialCase,
     as_normal,
@@ -44,7 +43,7 @@ from upd.analyses.contact.solution import (
 from upd.contact import tangential_contact, tangential_path
 from upd.contact.checks import few_threads
 from upd.contact.model import Body, ContactModel
-from upd.contact.normal import normal_contact, normal_curve
+from upd.contact.normal import NormalContact, normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
 from upd.contact.tangential import TangentialPath
 from upd.contact.tilt import tilted_contact
@@ -62,10 +61,8 @@ Marched = tuple[Array, Array, Callable[[int, float], TangentialCase]]
 
 #: Shares of mu N of the force-displacement curve: even steps, then closer to gross slip.
 PATH_SHARES = np.concatenate(
-    [np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]]
+    [np.arange(1, 19) / 20.0, [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]]
 )
-# On the way to the tangential loads of a curved contact where the pressure follows the shear.
-_SHARES = np.arange(1, 20) / 20.0
 #: tangential load of an initial stiffness of coupled contact, as a part of mu N
 SMALL_SHEAR = 1e-3
 
@@ -105,10 +102,7 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
         solution.curve = [(F, found[F].solution.approach) for F in curve]
-        solution.normal = [
-            NormalCase(**vars(found[F]), force=F, measures=measured(solution, found[F].solution, F))
-            for F in wanted
-        ]
+        solution.normal = [found[F] for F in wanted]
         for body in _bodies_alone(solution):
             alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
@@ -131,15 +125,13 @@ def _curve_loads(plan: ContactPlan, largest: float, curved: bool) -> list[float]
     top = largest if loads.curve_to is None else loads.curve_to
     if not plan.scene.wants("curve") or not top > 0.0:
         return []
-    n = loads.curve_points
-    if curved:
-        return [top * s**1.5 for s in np.linspace(0.0, 1.0, n + 1)[1:]]
-    return [top * k / n for k in range(1, n + 1)]
+    shares = np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]
+    return [float(top * s) for s in (shares**1.5 if curved else shares)]
 
 
 def press(
     solution: ContactSolution, forces: Iterable[float], body: Body | None = None
-) -> dict[float, PressedContact]:
+) -> dict[float, NormalCase]:
     """Answers of the forces in N on the whole contact, by force.
 
     Parameters
@@ -162,10 +154,11 @@ def press(
         return model.compliance(NORMAL, body=body)
 
     if arms.size:
-        found, free = [], (0 not in plan.mirrors, 1 not in plan.mirrors)
-        for F in loads:
-            t = tilted_contact(compliance(), model.gap, arms, load=F, free=free)
-            found.append(PressedContact(t.normal, plan.copies * t.free_stiffness, tilt=t.tilt))
+        free = (0 not in plan.mirrors, 1 not in plan.mirrors)
+        tilted = [tilted_contact(compliance(), model.gap, arms, load=F, free=free) for F in loads]
+        found: list[tuple[NormalContact, float, Array | None]] = [
+            (t.normal, t.free_stiffness, t.tilt) for t in tilted
+        ]
     else:
         answers = settled(
             model,
@@ -173,8 +166,11 @@ def press(
             lambda: normal_curve(compliance(), model.gap, loads),
             lambda found: [(np.column_stack([one.force for one in found]), KNOWN)],
         )
-        found = [PressedContact(one, plan.copies * one.stiffness) for one in answers]
-    out = dict(zip(distinct, found, strict=True))
+        found = [(one, one.stiffness, None) for one in answers]
+    out = {
+        F: NormalCase(F, one, plan.copies * K, measured(solution, one, F), tilt=tilt)
+        for F, (one, K, tilt) in zip(distinct, found, strict=True)
+    }
     for F in distinct if _by_slope(solution) else ():
         ends = [out.get(F * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP)]
         if F > 0.0 and ends[0] and ends[1]:
@@ -185,7 +181,7 @@ def press(
 
 def _sheared_too(
     solution: ContactSolution, forces: Sequence[float], body: Body | None
-) -> dict[float, PressedContact]:
+) -> dict[float, NormalCase]:
     """The same with normal and tangential contact at once, the slope of the curve as the stiffness
     where it is known.
     """
@@ -193,8 +189,10 @@ def _sheared_too(
     arms = tilt_arms(solution.plan, model)
     states = raised(model, mu, forces, arms, body=body)
     # no load: friction has nothing to hold
-    none = partial(normal_contact, model.compliance(NORMAL), model.gap, load=0.0)
-    out = {F: PressedContact(none(), 0.0) for F in forces if not F > 0.0}
+    out = {}
+    for F in (F for F in forces if not F > 0.0):
+        none = normal_contact(model.compliance(NORMAL), model.gap, load=0.0)
+        out[F] = NormalCase(F, none, 0.0, measured(solution, none, F))
     for F, state in states.items():
         sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
         free = slope(states, F) if sloped else float("nan")
@@ -203,7 +201,8 @@ def _sheared_too(
             # dF/d approach with the tilts held and the states kept, shifts following
             held = float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
         tilt = state.motion[3:] if arms.size else None
-        out[F] = PressedContact(as_normal(state, held), free, state, tilt)
+        answer = as_normal(state, held)
+        out[F] = NormalCase(F, answer, free, measured(solution, answer, F), state, tilt)
     return out
 
 
@@ -223,9 +222,6 @@ def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
 def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
     """Stiffness, tangential loads, curve and cycle of every direction after every normal load."""
     scene = solution.plan.scene
-    # The march to the loads: of flat faces to gross slip, for a curve.
-    below = _SHARES[planned.largest_ratio(scene) > _SHARES]
-    shares = below if solution.curved else PATH_SHARES
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
         loaded = [case for case in solution.normal if case.solution.force.any()]
         # Twice: what one load teaches changes the answers of the others within the tolerance.
@@ -234,29 +230,28 @@ def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
             Frozen(solution, case, 0.0).learn()
         for case in loaded:
             for direction in scene.loads.directions:
-                _sheared(solution, case, direction, shares)
+                _sheared(solution, case, direction)
 
 
-def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
-    """Stiffness, single loads, curve and cycle of one direction after one normal load."""
-    scene, own = solution.plan.scene, solution.sheared_case(case, direction)
+def _sheared(solution: ContactSolution, case: NormalCase, direction: float) -> None:
+    """Stiffness, loads on one way, cycle of one direction after one normal load."""
+    scene, curved = solution.plan.scene, solution.curved
     way = (Frozen if case.state is None else _Coupled)(solution, case, direction)
     # Flat faces share their law by the stuck contact.
-    if not solution.curved or scene.wants("stiffness"):
+    if not curved or scene.wants("stiffness"):
         case.stuck[direction] = way.stuck()
     loads = scene.loads.tangential if scene.wants("tangential") else ()
-    # Each load of a curved contact with frozen forces alone, all others on one way.
-    marches = [np.array([ratio]) for ratio in loads]
-    if scene.wants("tangential") and not (solution.curved and case.state is None):
-        marches = [np.unique(np.concatenate([shares, loads]))]
-    for ratios in marches:
+    # Flat faces go on to gross slip, for a curve.
+    shares = PATH_SHARES[max(loads, default=0.0) > PATH_SHARES] if curved else PATH_SHARES
+    if loads or (scene.wants("tangential") and not curved):
+        few = curved and case.state is None
+        ratios = np.unique(np.concatenate([[] if few else shares, loads]))
         load, moved, at = way.march(ratios)
-        if not solution.curved:
-            solution.paths.append(LoadPath(own, load, moved))
-        for ratio in (r for r in loads if r in ratios):
-            solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
+        if not curved:
+            solution.paths.append(LoadPath(solution.sheared_case(case, direction), load, moved))
+        solution.tangential += [at(int(np.searchsorted(ratios, r)), r) for r in loads]
     if scene.wants("cycle"):
-        amplitude = scene.loads.cycle_amplitude if solution.curved else None
+        amplitude = scene.loads.cycle_amplitude if curved else None
         solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
 
 
