@@ -240,15 +240,6 @@ def test_state_map_shows_what_the_run_counted(hertz: RunFolder) -> None:
     assert int((chart.maps[0].z > 0).sum()) == int(closed.sum())
 
 
-def test_force_per_length_adds_up_to_the_load(damper: Path) -> None:
-    found = read_run(damper)
-    chart = _chart(found, "Normal force per length")
-    for trace in chart.traces:
-        edges = np.concatenate([trace.x[:1], 0.5 * (trace.x[1:] + trace.x[:-1]), trace.x[-1:]])
-        force = float(found.arrays[trace.label]["normal_force"].data.sum())
-        assert float((trace.y * np.diff(edges)).sum()) == pytest.approx(force, rel=1e-12)
-
-
 def test_labels_cannot_carry_markup() -> None:
     chart = replace(_simple_chart(), title="t")
     hostile = replace(chart, traces=(replace(chart.traces[0], label="<a href='http://x'>y</a>"),))

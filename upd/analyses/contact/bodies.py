@@ -157,14 +157,6 @@ def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
     return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
 
 
-def held_sets(mesh: Mesh) -> list[str]:
-    """Names of the distant sets that can hold a body: fewer than three nodes leave it free to
-    turn.
-    """
-    sets = [key for key, nodes in mesh.nodes.items() if len(nodes) > 2]
-    return [key.removeprefix("distant_") for key in sets if key.startswith("distant_")]
-
-
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
     data = plan.scene.materials[name]
     material = Material(data.E, data.nu, data.density)
@@ -320,20 +312,16 @@ def solve_inside(solution: ContactSolution) -> None:
     they have an axis.
     """
     sphere = solution.plan.scene.sphere_radius is not None
-    for case in solution.normal:
-        frictionless = _displaced(solution, case, sphere)
-        if sphere and case.force > 0.0:
-            _add_shares(solution, case, frictionless)
-
-
-def _displaced(solution: ContactSolution, case: NormalCase, sphere: bool) -> dict[str, Array]:
-    """Keep the displacements; those without friction, which go with the load, are returned."""
     model, copies = solution.model, solution.plan.copies
-    forces = case.solution.force if case.state is None else case.state.force
-    case.displacement, case.reaction = pressed(model, forces, copies)
-    if case.state is None or not sphere:
-        return case.displacement
-    return pressed(model, case.solution.force, copies)[0]
+    for case in solution.normal:
+        forces = case.solution.force if case.state is None else case.state.force
+        case.displacement, case.reaction = pressed(model, forces, copies)
+        if sphere and case.force > 0.0:
+            # without friction it goes with the load
+            frictionless = case.displacement
+            if case.state is not None:
+                frictionless = pressed(model, case.solution.force, copies)[0]
+            _add_shares(solution, case, frictionless)
 
 
 def _add_shares(

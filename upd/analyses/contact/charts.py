@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from upd.plot.chart import Axis, Band, Chart, Map, Scatter, Style, Trace
 from upd.plot.common import (
-    FACE,
     UM,
     case_of,
     circle,
@@ -64,7 +63,6 @@ def contact_charts(arrays: Arrays, summary: Mapping[str, Any], *, curved: bool) 
     return [
         *(pressure(case.label, normal[case], sheet=k < _SHOWN) for k, case in enumerate(order)),
         *(_three_sections(group) for case in order if curved for group in normal[case]),
-        *([_per_length(normal)] if normal and not curved else []),
         *(
             _states(
                 case,
@@ -83,9 +81,7 @@ def contact_charts(arrays: Arrays, summary: Mapping[str, Any], *, curved: bool) 
             if curved and (mine := [g for c, (g,) in sheared.items() if c.load == load.load])
         ),
         *(_approach(group) for group in with_content(arrays, "force-approach")),
-        *_paths(arrays, "path"),
-        *(_loop(group) for group in reversed(with_content(arrays, "cycle")) if curved),
-        *(_paths(arrays, "cycle") if not curved else []),
+        *_paths(arrays, curved=curved),
         *(
             _law(group, normal.get(case_of(group), []), sheet=case_of(group) == order[0])
             for group in with_content(arrays, "contact law")
@@ -136,15 +132,9 @@ def _states(
 
 
 def _approach(group: Group) -> Chart:
-    """Force over approach, beside the closed form or the printed stiffness."""
+    """Force over approach, beside the closed form."""
     F, d = values(group, "normal_force"), values(group, "approach", UM)
-    # The curve of flat faces starts unloaded.
-    flat, stiffness = F[0] != 0.0, scalar(group, "stiffness")
-    F, d = (np.concatenate([[0.0], v]) if flat else v for v in (F, d))
-    label = "computed" if flat else "computed, distant set to distant set"
-    if stiffness is not None:
-        label += f", K_N = {stiffness:.3g} N/mm"
-    traces = [Trace(label, d, F, "both", 0)]
+    traces = [Trace("computed, distant set to distant set", d, F, "both", 0)]
     if "hertz_approach" in group:
         closed = values(group, "hertz_approach", UM), values(group, "hertz_normal_force")
         traces.append(Trace("Hertz", *closed, closed=True))
@@ -155,13 +145,44 @@ def _approach(group: Group) -> Chart:
     return Chart("Force over approach", *axes, tuple(traces), figure="force_approach")
 
 
-def _path(
-    label: str, group: Group, colour: int, style: Style = "line", compliance: float = 0.0
-) -> Trace:
-    """Tangential force in N over displacement in um, less ``compliance`` (mm/N) times it."""
-    T = values(group, "tangential_force")
-    d = values(group, "displacement", UM) - UM * compliance * T
-    return Trace(label, d, T, style, colour)
+def _paths(arrays: Arrays, *, curved: bool) -> list[Chart]:
+    """Tangential force over displacement, then cycles: one chart per direction of flat faces, one
+    per load of a curved contact.
+    """
+    out: list[Chart] = []
+    for content in ("path", "cycle"):
+        found: dict[str, list[Group]] = {}
+        for group in with_content(arrays, content)[:: -1 if curved else 1]:
+            case = case_of(group)
+            key = case.label if curved else f"along {case.direction}"
+            found.setdefault(key, []).append(group)
+        out += [_path_chart(case, groups, content == "cycle") for case, groups in found.items()]
+    return out
+
+
+def _path_chart(case: str, groups: list[Group], cycle: bool) -> Chart:
+    traces, bands = [], []
+    for k, group in enumerate(groups):
+        T, bodies = values(group, "tangential_force"), scalar(group, "finite_body_compliance")
+        d = values(group, "displacement", UM) - UM * (bodies or 0.0) * T
+        label = Case(load=case_of(group).load).label
+        label += ", bulk compliance removed" if bodies is not None else ""
+        traces.append(Trace(label, d, T, "line" if cycle else "both", k))
+        limit = scalar(group, "friction_limit")
+        if limit is not None and not cycle:
+            bands.append(Band("µ F_N", "y", limit, limit, k, dashed=True))
+        if "mindlin_force" in group:
+            d, T = values(group, "mindlin_displacement", UM), values(group, "mindlin_force")
+            traces.append(Trace("Mindlin-Deresiewicz", d, T, "dashed", closed=True))
+    return Chart(
+        "Hysteresis" if cycle else "Tangential force over displacement",
+        Axis("displacement", "µm"),
+        Axis("tangential force F_T", "N"),
+        tuple(traces),
+        case=case,
+        figure="hysteresis" if cycle else "force_displacement",
+        bands=tuple(bands),
+    )
 
 
 # -- of a curved contact ---------------------------------------------------------------------------
@@ -237,59 +258,7 @@ def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
     return Chart(title, _X_UM, ordinate, traces, case=case, figure="traction")
 
 
-def _loop(group: Group) -> Chart:
-    bodies = scalar(group, "finite_body_compliance")
-    label = "computed, with the bodies" if bodies is None else "computed, bulk compliance removed"
-    traces = [_path(label, group, 0, compliance=bodies or 0.0)]
-    if "mindlin_force" in group:
-        d, T = values(group, "mindlin_displacement", UM), values(group, "mindlin_force")
-        traces.append(Trace("Mindlin-Deresiewicz", d, T, "dashed", closed=True))
-    axes = Axis("tangential displacement", "µm"), Axis("tangential force T", "N")
-    return Chart("Hysteresis", *axes, tuple(traces), case=case_of(group).label, figure="hysteresis")
-
-
 # -- of flat faces ---------------------------------------------------------------------------------
-
-
-def _per_length(normal: Faces) -> Chart:
-    traces = []
-    for k, (case, groups) in enumerate(normal.items()):
-        for group in groups:
-            x, F = values(group, "x"), values(group, "normal_force").sum(axis=1)
-            # Length a lattice line stands for: half way to its neighbours.
-            edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
-            traces.append(Trace(case.label, x, F / np.diff(edges), "both", k))
-    more = FACE | {"y": Axis("force per length", "N/mm", low=0.0)}
-    more |= {"figure": "pressure", "columns": 3}
-    return Chart("Normal force per length", traces=tuple(traces), **more)
-
-
-def _paths(arrays: Arrays, content: str) -> list[Chart]:
-    """One chart per direction, one curve per normal load."""
-    found: dict[str, list[Group]] = {}
-    for group in with_content(arrays, content):
-        found.setdefault(case_of(group).direction, []).append(group)
-    return [
-        _path_chart(direction, groups, content == "cycle") for direction, groups in found.items()
-    ]
-
-
-def _path_chart(direction: str, groups: list[Group], cycle: bool) -> Chart:
-    traces, bands = [], []
-    for k, group in enumerate(groups):
-        load, limit = Case(load=case_of(group).load).label, scalar(group, "friction_limit")
-        traces.append(_path(load, group, k, "line" if cycle else "both"))
-        if limit is not None and not cycle:
-            bands.append(Band("µ F_N", "y", limit, limit, k, dashed=True))
-    return Chart(
-        "Hysteresis" if cycle else "Tangential force over displacement",
-        Axis("displacement", "µm"),
-        Axis("tangential force F_T", "N"),
-        tuple(traces),
-        case=f"along {direction}" if direction else "",
-        figure="force_displacement",
-        bands=tuple(bands),
-    )
 
 
 def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:

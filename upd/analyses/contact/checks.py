@@ -222,30 +222,33 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
+    ways = {"patch": f'"{needed:.3g} mm" or more, or to "auto"'}
+    without = f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
     remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
-    if recipes.has_parameter(solution.plan.scene.recipe, "patch"):
-        remedy += f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
-    else:
-        remedy += f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
+    remedy += _to_set(solution.plan.scene, ways, without)
     nodes = solution.rim_nodes(case)
     return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
 
 
+def _to_set(scene: Scene, ways: Mapping[str, str], without: str) -> str:
+    """What to set of the recipe's parameters, and ``without`` any of them what to do."""
+    known = [
+        f"geometry.{name} to {value}"
+        for name, value in ways.items()
+        if recipes.has_parameter(scene.recipe, name)
+    ]
+    return f"set {' or '.join(known)}" if known else without
+
+
 def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
-    scene, radius = solution.plan.scene, case.measures.radius_moment
-    spacing, width = solution.model.patch.spacing, float(np.ptp(solution.model.patch.X))
-    ways = ['geometry.patch to "auto"'] if recipes.has_parameter(scene.recipe, "patch") else []
-    if recipes.has_parameter(scene.recipe, "divisions"):
-        divisions = int(2 * np.ceil(1.5 * width / max(radius, 0.1 * spacing)))
-        ways.append(f"geometry.divisions to {divisions} or more")
-    finer = (
-        f"set {' or '.join(ways)}"
-        if ways
-        else f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
-    )
-    rough = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
-    value, what = 3.0 * spacing / max(radius, 1e-300), "3 h / a (a contact radius, h node spacing)"
-    return _warning("resolution", case.case, value, 1.0, what, rough + finer)
+    patch, radius = solution.model.patch, case.measures.radius_moment
+    divisions = 2 * np.ceil(1.5 * float(np.ptp(patch.X)) / max(radius, 0.1 * patch.spacing))
+    ways = {"patch": '"auto"', "divisions": f"{divisions:.0f} or more"}
+    without = f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
+    remedy = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
+    remedy += _to_set(solution.plan.scene, ways, without)
+    value, what = 3.0 * patch.spacing / max(radius, 1e-300), "3 h / a (a contact radius, h spacing)"
+    return _warning("resolution", case.case, value, 1.0, what, remedy)
 
 
 def _flat_resolution_check(solution: ContactSolution) -> Check:
@@ -266,29 +269,16 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     scene = solution.plan.scene
     # the multipliers of hex20 sit at its corners
     enough = _ACROSS // 2 if scene.mesh.element == "hex20" else _ACROSS
-    way = (
-        f"set geometry.{name} to {enough} or more"
-        if recipes.has_parameter(scene.recipe, name)
-        else f"mesh the contact with {enough} elements or more along each edge"
-    )
+    without = f"mesh the contact with {enough} elements or more along each edge"
+    way = _to_set(scene, {name: f"{enough} or more"}, without)
     what = f"{enough} / lines of elements across the contact"
     remedy = f"the stiffnesses are wrong by more than about 5 %: {way}"
     return _warning("resolution", NO_CASE, enough / fewest, 1.0, what, remedy)
 
 
-def _curved_checks(solution: ContactSolution) -> list[Check]:
-    """Of a curved contact as a whole: small against its curvature, and split from its bodies."""
-    checks = [_steepness_check(solution)]
-    if solution.no_shares:
-        text, remedy = solution.no_shares, "use a larger or finer body"
-        checks.append(_warning("body compression", NO_CASE, 1, 0, text, remedy))
-    return checks
-
-
-def _steepness_check(solution: ContactSolution) -> Check:
-    """Steepest slope of the undeformed gap at the nodes in contact, over all loads.
-
-    a / R for a sphere.
+def _curved_checks(solution: ContactSolution) -> Iterator[Check]:
+    """Of a curved contact as a whole: steepest slope of the undeformed gap at the nodes in contact
+    over all loads (a / R for a sphere), and whether it was split from its bodies.
     """
     patch = solution.model.patch
     steepness = np.hypot(*patch.slopes(solution.model.gap))
@@ -299,7 +289,10 @@ def _steepness_check(solution: ContactSolution) -> Check:
         "the contact reaches where the faces are too steep for small-displacement theory: lower "
         "the load"
     )
-    return Check("slope in the contact", NO_CASE, slope, 0.2, text, remedy)
+    yield Check("slope in the contact", NO_CASE, slope, 0.2, text, remedy)
+    if solution.no_shares:
+        remedy = "use a larger or finer body"
+        yield _warning("body compression", NO_CASE, 1, 0, solution.no_shares, remedy)
 
 
 # -- onset of yield --------------------------------------------------------------------------------
@@ -314,24 +307,20 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
     """
     scene, model = solution.plan.scene, solution.model
     limited = [b for b in (model.upper, model.lower) if scene.materials[b.name].yield_stress]
-    pressure = model.multipliers.pressure
-    loads: list[tuple[NormalCase | TangentialCase, float, bool, list[Array]]] = [
-        (c, c.force, True, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
-    ]
-    for t in solution.tangential:
-        shear = np.zeros((2, len(t.pressed)))
-        shear[list(t.nodes.components)] = solution.tractions(t)
-        closed = solution.closed_form_traction(t) is not None
-        fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
-        loads.append((t, t.normal.force, closed, fields))
-    for one, force, closed, fields in loads if limited else ():
-        by_hertz = closed and solution.hertz_of(force) is not None
+    pressed = [one for one in solution.normal if one.force > 0.0]
+    cases: list[NormalCase | TangentialCase] = [*pressed, *solution.tangential]
+    for one in cases if limited else ():
+        normal = one.normal if isinstance(one, TangentialCase) else one
+        by_hertz = solution.hertz_of(normal.force) is not None
+        if isinstance(one, TangentialCase):
+            by_hertz = solution.closed_form_traction(one) is not None
+        fields = [] if by_hertz else _fields(solution, one)
         faces = [] if by_hertz else [on_lines(k, fields) for k in solution.lattices.values()]
         for body in limited:
             limit = scene.materials[body.name].yield_stress
             assert limit is not None
             if by_hertz:
-                stress, what = _hertz_stress(solution, one.case, force, body.name)
+                stress, what = _hertz_stress(solution, one.case, normal.force, body.name)
             else:
                 # the upper body feels the tractions the other way round
                 sign = -1.0 if body is model.upper else 1.0
@@ -339,6 +328,16 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
             what = f"largest von Mises stress / yield stress of {body.name}, {what}"
             case = replace(one.case, body=body.name)
             yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
+
+
+def _fields(solution: ContactSolution, one: NormalCase | TangentialCase) -> list[Array]:
+    """Pressure and, under a tangential load, tractions on the lower body along x and y, MPa."""
+    pressure = solution.model.multipliers.pressure
+    if isinstance(one, NormalCase):
+        return [pressure(one.solution.force)]
+    shear = np.zeros((2, len(one.pressed)))
+    shear[list(one.nodes.components)] = solution.tractions(one)
+    return [pressure(np.maximum(one.pressed, 0.0)), *shear]
 
 
 def _hertz_stress(

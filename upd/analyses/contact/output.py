@@ -52,10 +52,12 @@ def arrays(solution: ContactSolution) -> dict[str, Group]:
             out[name] = Group(lines | fields, content=content, case=case, **face)
     for path in solution.paths:
         content = "cycle" if path.cycle else "path"
+        gross = solution.plan.scene.contact.friction * (path.case.load or 0.0)
+        limit = {"friction_limit": variable("", gross, "N")}
         variables = {
             "displacement": variable("step", path.displacement, "mm"),
             "tangential_force": variable("step", path.load, "N"),
-            **(_deresiewicz(solution, path) if solution.curved else _limit(solution, path)),
+            **(_deresiewicz(solution, path) if solution.curved else limit),
         }
         out[f"{content} {path.case.label}"] = Group(variables, content=content, case=path.case)
     if solution.curve:
@@ -165,12 +167,9 @@ def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
 def _curve(solution: ContactSolution) -> Variables:
     """Force over approach in mm and N."""
     F, d = (np.array(values) for values in zip(*solution.curve, strict=True))
-    if solution.curved:
-        # It starts where the faces meet.
-        d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
-        own = _approach_over_load(solution, d, F)
-    else:
-        own = {"stiffness": variable("", solution.normal[0].stiffness, "N/mm")}
+    # It starts where the faces meet.
+    d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
+    own = _approach_over_load(solution, d, F) if solution.curved else {}
     return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
 
 
@@ -191,12 +190,6 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
 
 
 # -- of flat faces ---------------------------------------------------------------------------------
-
-
-def _limit(solution: ContactSolution, path: LoadPath) -> Variables:
-    """Load of gross slip."""
-    limit = solution.plan.scene.contact.friction * (path.case.load or 0.0)
-    return {"friction_limit": variable("", limit, "N")}
 
 
 def _laws(solution: ContactSolution) -> dict[str, Group]:

@@ -304,8 +304,8 @@ def hertz_radius(scene: Scene, load: float) -> float:
     """Hertz's radius in mm of a sphere under the load in N."""
     if scene.sphere_radius is None:
         raise InputError(
-            'geometry: "auto" sizes are known for a sphere on a plane only; recipe '
-            f"{scene.recipe!r} needs lengths"
+            'geometry: "auto", and an accuracy, size the mesh of a sphere on a plane only; recipe '
+            f"{scene.recipe!r} needs lengths and divisions"
         )
     m1, m2 = list(scene.materials.values())[:2]
     E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
@@ -330,8 +330,8 @@ def auto_patch(scene: Scene) -> float:
     load = max(scene.loads.forces)
     if not load > 0.0:
         raise InputError(
-            'geometry.patch: "auto" needs a positive normal load to size the patch; give '
-            "the patch a length"
+            'geometry.patch: "auto", or an accuracy, needs a positive normal load to size the '
+            "patch; give the patch a length"
         )
     return 2.6 * hertz_radius(scene, load)
 

@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Plan
-from upd.analyses.contact.bodies import held_sets
 from upd.analyses.contact.plan import (
     ContactPlan,
     auto_patch,
@@ -80,8 +79,7 @@ from upd.vary.wanted import plan_wanted
 
 #: fewest divisions of a level
 FEWEST = 4
-_NO_DIVISIONS = "the mesh cannot be made coarser: its recipe has no divisions to lower"
-_COARSEST = "the mesh is the coarsest there is: set geometry.divisions to {} or more"
+_COARSEST = f"the mesh cannot be made coarser: give geometry.divisions, {FEWEST + 2} or more"
 #: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
 #: parameters of a recipe that the load may size
@@ -209,9 +207,7 @@ def levels(plan: ContactPlan) -> Levels:
     """
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(plan.scene) else COARSER
-    known = isinstance(plan.parameters.get("divisions"), int)
-    why = _COARSEST.format(FEWEST + 2) if known else _NO_DIVISIONS
-    return {MESH: [_coarser(plan, n) for n in coarser_divisions(plan, ratios)] or why}
+    return {MESH: [_coarser(plan, n) for n in coarser_divisions(plan, ratios)] or _COARSEST}
 
 
 def _coarser(plan: ContactPlan, divisions: int) -> Variation:
@@ -244,15 +240,8 @@ def _curved_level(scene: Scene, nodes: float) -> Overrides:
 
     A patch sized from the largest load, no larger than the scene's, spacing from the smallest.
     """
-    if scene.sphere_radius is None:
-        raise InputError(
-            f"accuracy: the recipe {scene.recipe!r} has no contact radius to size the "
-            'mesh from; give geometry.divisions, and no accuracy or "unknown"'
-        )
-    loads = [F for F in scene.loads.forces if F > 0.0]
-    if not loads:
-        raise InputError("accuracy: needs a positive normal load to size the mesh")
-    radius, patch = hertz_radius(scene, min(loads)), auto_patch(scene)
+    patch = auto_patch(scene)
+    radius = hertz_radius(scene, min(F for F in scene.loads.forces if F > 0.0))
     if scene.geometry.get("patch", "auto") != "auto":
         patch = min(patch, float(scene.geometry["patch"]))
     divisions = 2 * math.ceil(0.5 * patch / radius * nodes)
@@ -440,9 +429,8 @@ _DIVISIONS, _STUDY_SHARES = (12, 16, 20, 28, 40, 56), (0.5, 0.67, 1.0, 1.34, 1.6
 #: usual accuracies in per cent, of a curved contact (3 % takes 7 GB on the ready sphere, 2 % 24 GB)
 #: and of a flat one
 _ACCURACIES, _FLAT_ACCURACIES = (40.0, 10.0, 3.0), (20.0, 10.0, 5.0)
-#: numbers of the table of what moves the stiffness, of one pad where the contact is two
-_STIFFNESSES = ("K_N_secant_raw", "K_N_*_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
-_PER_PAD = ("K_N_per_pad", "K_N_*_alone", "K_Tx_per_pad", "K_Ty_per_pad")
+#: numbers of the table of what moves the stiffness
+_STIFFNESSES = ("K_N_secant_raw", "K_N_*_alone", "K_T?_initial_raw", "K_*_per_pad")
 #: lengths of a recipe, and times of them that are tried
 _FACTORS = {
     **dict.fromkeys(("margin", "thickness"), (0.25, 0.5, 1.5)),
@@ -543,8 +531,10 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
         for value in (factor * length for factor in factors if isinstance(length, float)):
             yield f"{name} {value:g} mm", _lengths({name: value})
     for body, mesh in recipes.build_mesh(scene.recipe, plan.parameters)[0].items():
-        for name in held_sets(mesh):
-            if scene.contact.distant.get(body) != name:
+        for key, nodes in mesh.nodes.items():
+            name = key.removeprefix("distant_")
+            # fewer than three nodes leave a body free to turn
+            if name not in (key, scene.contact.distant.get(body)) and len(nodes) > 2:
                 yield f"{body} held at {name}", ((f"contact.distant.{body}", name),)
     other = "free" if scene.contact.tilt == "held" else "held"
     yield f"tilt {other}", (("contact.tilt", other),)
@@ -561,7 +551,7 @@ def _stiffnesses(scene: object, solved: Sequence[SolvedPoint], names: Sequence[s
     """Stiffnesses of every point at its first normal load."""
     del scene, names
     first: dict[str, Key] = {}
-    for key in matching(solved, _PER_PAD if matching(solved, _PER_PAD[:1]) else _STIFFNESSES):
+    for key in matching(solved, _STIFFNESSES):
         first.setdefault(key[0], key)
     table = points_table(solved, list(first.values()))
     return StudyReport((table,), bool(without_failed(solved)))
