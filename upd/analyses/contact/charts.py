@@ -245,7 +245,7 @@ def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
     for k, group in enumerate(tangential):
         x, q = values(group, "x", UM), values(group, "traction")
         inside, name = np.abs(x) <= half, f"T/µN={case_of(group).ratio:g}"
-        along = (q[..., 0] if q.ndim == 3 else q)[:, q.shape[1] // 2][inside]
+        along = q[inside, q.shape[1] // 2, 0]
         computed.append(Trace(f"{name}, computed", x[inside], along, "points", k, entry=name))
         if "mindlin_traction" in group:
             at, y = values(group, "mindlin_x", UM), values(group, "mindlin_traction")

@@ -163,46 +163,37 @@ def _loop_check(path: LoadPath) -> Check:
     return Check("loop area", path.case, error, 1e-2, "|loop area / slip work - 1|", remedy)
 
 
-def _left_out_checks(solution: ContactSolution) -> list[Check]:
-    """Of the effects left out; they carry the names the plan gives them."""
+def _left_out_checks(solution: ContactSolution) -> Iterator[Check]:
+    """Of the effects left out, which carry the names the plan gives them; of what materials do.
+
+    Bodies of finite shape couple normal and tangential contact whatever their materials: nearly
+    not at all where the contact is small against both, much where it is as large as they are.
+
+    hex8 holds the volume at eight points (T. J. R. Hughes, The Finite Element Method, 2000, section
+    4.3: volumetric locking). The ready sphere under 200 N with 24 divisions: its largest pressure
+    is +0.3, 0.7, 1.9, 5.3, 10, 56, 233 % off Hertz with nu = 0.3, 0.4, 0.45, 0.48, 0.49, 0.499,
+    0.4999; hex8i's -0.4 to -2.1 %.
+    """
     plan, scene = solution.plan, solution.plan.scene
-    checks = [one.check(scene.left_out, REMEDIES[one.effect]) for one in solution.left_out]
+    for one in solution.left_out:
+        yield one.check(scene.left_out, REMEDIES[one.effect])
     if plan.effect("friction") and not scene.coupled:
-        checks.append(_coupling_check(scene))
+        what = "|beta|: how much pressure shears half-spaces of unlike materials"
+        remedy = (
+            "pressure shears the contact of these materials, which the tangential numbers leave "
+            'out: set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
+        )
+        limit = scene.contact.coupling_limit
+        yield _warning("Dundurs beta", NO_CASE, beta_of(scene), limit, what, remedy)
     if scene.mesh.element == "hex8":
-        checks.append(_locking_check(solution))
-    return checks
-
-
-def _coupling_check(scene: Scene) -> Check:
-    """How far the materials are from shearing a contact of half-spaces by pressure alone.
-
-    Bodies of finite shape couple the two problems whatever their materials: nearly not at all
-    where the contact is small against both, much where it is as large as they are.
-    """
-    what = "|beta|: how much pressure shears half-spaces of unlike materials"
-    remedy = (
-        "pressure shears the contact of these materials, which the tangential numbers leave out: "
-        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
-    )
-    return _warning(
-        "Dundurs beta", NO_CASE, beta_of(scene), scene.contact.coupling_limit, what, remedy
-    )
-
-
-def _locking_check(solution: ContactSolution) -> Check:
-    """Volume that eight integration points hold in a nearly incompressible body.
-
-    The ready sphere under 200 N with 24 divisions: hex8's largest pressure is +0.3, 0.7, 1.9, 5.3,
-    10, 56, 233 % off Hertz with nu = 0.3, 0.4, 0.45, 0.48, 0.49, 0.499, 0.4999; hex8i's -0.4 to
-    -2.1 %. (T. J. R. Hughes, The Finite Element Method, 2000, section 4.3: volumetric locking.)
-    """
-    remedy = (
-        "hex8 locks where a body is nearly incompressible: pressures are more than about 5 % too "
-        'high, and at 0.4999 more than three times the right ones: set mesh.element = "hex8i"'
-    )
-    largest = max(one.nu for one in solution.plan.scene.materials.values())
-    return _warning("locking", NO_CASE, largest, 0.48, "Poisson's ratio of bodies of hex8", remedy)
+        largest = max(one.nu for one in scene.materials.values())
+        remedy = (
+            "hex8 locks where a body is nearly incompressible: pressures are more than about 5 % "
+            "too high, and at 0.4999 more than three times the right ones: set mesh.element = "
+            '"hex8i"'
+        )
+        what = "Poisson's ratio of bodies of hex8"
+        yield _warning("locking", NO_CASE, largest, 0.48, what, remedy)
 
 
 # -- size and place of the contact -----------------------------------------------------------------

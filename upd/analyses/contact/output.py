@@ -98,16 +98,11 @@ def _sheared(
 
 
 def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Variables:
-    traction, XY = solution.tractions(t), _dims(k)
-    out = _sheared(k, traction, list(t.slip.T), t.stick)
-    if solution.curved and len(traction) == 1:
-        # One direction has no dimension of its own.
-        out["traction"] = variable(XY, k.whole(traction[0]), "MPa")
-        out["slip"] = variable(XY, k.whole(t.slip[:, 0]), "mm")
+    out = _sheared(k, solution.tractions(t), list(t.slip.T), t.stick)
     if t.state is not None:
         # which coupled contact moves
         pressure = solution.model.multipliers.pressure(np.maximum(t.pressed, 0.0))
-        out["pressure"] = variable(XY, k.whole(pressure), "MPa")
+        out["pressure"] = variable(_dims(k), k.whole(pressure), "MPa")
     return out | _cattaneo(solution, t)
 
 

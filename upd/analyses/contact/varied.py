@@ -170,12 +170,24 @@ def coarser_divisions(plan: ContactPlan, ratios: Sequence[float]) -> list[int]:
     return found
 
 
-def spacing(parameters: Mapping[str, Any]) -> float:
-    """Size of the contact's elements, but for a factor of its size: of both directions the
-    geometric mean.
+def size_of(parameters: Mapping[str, Any]) -> float:
+    """Size of the contact's elements in mm but for a factor, of both directions the geometric
+    mean: over the edge that is divided, or 1 of a recipe that names none.
     """
+    edges = ("patch", "patch_length", "pad_length")
+    edge = next((float(parameters[n]) for n in edges if n in parameters), 1.0)
     counts = [float(parameters[n]) for n in ("divisions", "divisions_long") if n in parameters]
-    return float(np.prod(counts) ** (-1.0 / len(counts)))
+    return float(edge * np.prod(counts) ** (-1.0 / len(counts)))
+
+
+def _on_mesh(
+    source: str, plan: Plan[Any], geometry: Mapping[str, Any], *extra: tuple[str, Any]
+) -> Variation:
+    """The plan's scene with a mesh of other divisions."""
+    known = {**plan.parameters, **geometry}
+    counts = (str(known[n]) for n in ("divisions_long", "divisions") if n in known)
+    label = " x ".join(counts) + " divisions"
+    return Variation(source, label, (*of_geometry(geometry), *extra), size_of(known))
 
 
 def bare(scene: Scene) -> Overrides:
@@ -207,18 +219,12 @@ def levels(plan: ContactPlan) -> Levels:
     """
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(plan.scene) else COARSER
-    return {MESH: [_coarser(plan, n) for n in coarser_divisions(plan, ratios)] or _COARSEST}
-
-
-def _coarser(plan: ContactPlan, divisions: int) -> Variation:
-    geometry = level_geometry(plan.parameters, divisions)
-    size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
-    return Variation(MESH, _divisions(geometry), of_geometry(geometry), size)
-
-
-def _divisions(parameters: Mapping[str, Any]) -> str:
-    counts = (str(parameters[n]) for n in ("divisions_long", "divisions") if n in parameters)
-    return " x ".join(counts) + " divisions"
+    made = [
+        _on_mesh(MESH, plan, level_geometry(plan.parameters, n))
+        for n in coarser_divisions(plan, ratios)
+    ]
+    own = size_of(plan.parameters) if made else 1.0
+    return {MESH: [replace(one, size=one.size / own) for one in made] or _COARSEST}
 
 
 def governing(scene: Scene) -> tuple[str, ...]:
@@ -284,15 +290,8 @@ def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def edge_of(parameters: Mapping[str, Any]) -> float:
-    """Edge of the contact that is divided, mm; 1 of a recipe that names none."""
-    edges = ("patch", "patch_length", "pad_length")
-    return next((float(parameters[n]) for n in edges if n in parameters), 1.0)
-
-
 def level_of(plan: ContactPlan) -> Variation:
-    known = plan.parameters
-    return Variation(MESH, _divisions(known), size=spacing(known) * edge_of(known))
+    return _on_mesh(MESH, plan, {})
 
 
 def finer(plan: ContactPlan, source: str, factor: float) -> Overrides:
@@ -462,31 +461,29 @@ def _usual(plan: Plan[Any]) -> Sequence[int]:
 
 def _meshes(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
     element = plan.scene.mesh.element
-    return [_on_mesh(element, element, n, plan) for n in levels]
+    return [_studied(element, element, n, plan) for n in levels]
 
 
 def _elements(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
     chosen = ((e, max(4, 2 * (n // 4)) if e == "hex27" else n) for e in _FINEST for n in levels)
-    return [_on_mesh(e, e, n, plan) for e, n in chosen if n <= _FINEST[e]]
+    return [_studied(e, e, n, plan) for e, n in chosen if n <= _FINEST[e]]
 
 
 def _solvers(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
     return [
-        _on_mesh(solver, plan.scene.mesh.element, n, plan, ("solver.name", solver))
+        _studied(solver, plan.scene.mesh.element, n, plan, ("solver.name", solver))
         for solver, most in _AFFORDABLE.items()
         if solver != "pardiso" or select.has_pardiso()
         for n in levels[:most]
     ]
 
 
-def _on_mesh(
+def _studied(
     source: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]
 ) -> Variation:
     per_edge = 2 if NODES[element] > 8 else 1
     own = level_geometry(plan.parameters, divisions, per_edge=per_edge)
-    label = f"{own.get('divisions_long', divisions)} x {divisions}"
-    overrides = (*of_geometry(own), ("mesh.element", element), *extra)
-    return Variation(source, label, overrides, edge_of(plan.parameters) / divisions)
+    return _on_mesh(source, plan, own, ("mesh.element", element), *extra)
 
 
 def _patches(plan: Plan[Any], levels: Sequence[int]) -> Iterator[Variation]:
