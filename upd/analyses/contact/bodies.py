@@ -34,7 +34,6 @@ from upd.contact.products import (
     energy_error,
     half_space_start,
     learners,
-    normal_contact_by_products,
 )
 from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
@@ -292,16 +291,6 @@ def product_checks(
             'set solver.route = "condensed", or report the mesh',
         )
     ]
-
-
-def show_normal(model: ContactModel, loads: Sequence[float]) -> None:
-    """Show bodies that learn the forces of the normal loads in N on the model, one after the other.
-
-    Raises ConvergenceError where a product does not converge.
-    """
-    mask = None
-    for load in sorted(loads, reverse=True) if learns(model) else ():
-        mask = normal_contact_by_products(model, load=load, start=mask).contact
 
 
 # -- displacements inside --------------------------------------------------------------------------

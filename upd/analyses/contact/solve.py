@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.base import Resolved, keeping
 from upd.analyses.contact import plan as planned
-from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
+from upd.analyses.contact.bodies import learns, prepare, solve_inside
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import (
@@ -147,8 +147,6 @@ def press(
     if plan.scene.coupled:
         return _sheared_too(solution, distinct, body)
     loads, arms = [F / plan.copies for F in distinct], tilt_arms(plan, model)
-    if solution.curved:
-        show_normal(model, loads)
 
     def compliance() -> Array:
         return model.compliance(NORMAL, body=body)
@@ -164,7 +162,7 @@ def press(
             model,
             (NORMAL,),
             lambda: normal_curve(compliance(), model.gap, loads),
-            lambda found: [(np.column_stack([one.force for one in found]), KNOWN)],
+            _known,
         )
         found = [(one, one.stiffness, None) for one in answers]
     out = {
@@ -177,6 +175,14 @@ def press(
             moved = ends[1].solution.approach - ends[0].solution.approach
             out[F].stiffness = 2.0 * LOAD_STEP * F / moved
     return out
+
+
+def _known(found: Sequence[NormalContact]) -> Iterator[tuple[Array, float]]:
+    """Forces and their rates, and the largest share of them that may be unknown."""
+    for one in found:
+        yield one.force, KNOWN
+        if one.rates is not None:
+            yield one.rates, KNOWN_STIFFNESS
 
 
 def _sheared_too(
