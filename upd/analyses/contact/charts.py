@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Axis, Band, Chart, Map, Scatter, Style, Trace
+from upd.plot.chart import Axis, Band, Chart, Map, Scatter, Trace
 from upd.plot.common import (
     UM,
     case_of,
@@ -35,13 +35,6 @@ _PRESSURE, _FORCE = Axis("pressure", "MPa", low=0.0), Axis("normal force F", "N"
 _SHOWN = 2
 # Points of a closed form across a contact, whose ends are steep.
 _ACROSS = 401
-# Lattice lines of the sections, in half radii from the middle.
-_SECTIONS: tuple[tuple[float, int, Style], ...] = (
-    (0.0, 0, "points"),
-    (1.0, 1, "open points"),
-    (-1.0, 1, "crosses"),
-)
-
 # Closed forms of radii, drawn around a curved contact: name, label, whether dashed.
 _RADII = (("hertz_radius", "a, Hertz", False), ("mindlin_stick_radius", "c, Mindlin", True))
 
@@ -62,7 +55,7 @@ def contact_charts(arrays: Arrays, summary: Mapping[str, Any], *, curved: bool) 
     ratios = len({case.ratio for case in sheared})
     return [
         *(pressure(case.label, normal[case], sheet=k < _SHOWN) for k, case in enumerate(order)),
-        *(_three_sections(group) for case in order if curved for group in normal[case]),
+        *(_middle(group) for case in order if curved for group in normal[case]),
         *(
             _states(
                 case,
@@ -214,27 +207,17 @@ def _pressure(case: str, groups: list[Group], *, sheet: bool) -> Chart:
     return face_chart("Contact pressure", groups, case, "pressure", **more)
 
 
-def _three_sections(group: Group) -> Chart:
-    """Pressure along the middle and along the lattice lines nearest to half a radius from it, as
-    the thesis cuts it (its Figures 41 and 42).
-    """
-    x, y, p = values(group, "x", UM), values(group, "y", UM), values(group, "pressure")
-    a, p0, half = scalar(group, "hertz_radius"), scalar(group, "hertz_max_pressure"), _window(group)
-    inside = np.abs(x) <= half
-    off = 0.5 * (a * UM if a else half / 1.3)
-    traces: list[Trace] = []
-    for at, colour, style in _SECTIONS:
-        j = int(np.abs(y - at * off).argmin())
-        label = f"y = {y[j]:.0f} µm"
-        traces.append(Trace(f"{label}, computed", x[inside], p[inside, j], style, colour))
-        # The closed form is even in y.
-        if a and p0 and at >= 0.0:
-            reach = np.sqrt(max(0.0, (a * UM) ** 2 - y[j] ** 2))
-            along = np.linspace(-reach, reach, _ACROSS)
-            squared = np.maximum(0.0, 1.0 - (along**2 + y[j] ** 2) / (a * UM) ** 2)
-            closed, entry = p0 * np.sqrt(squared), "lines: Hertz"
-            traces.append(Trace(f"{label}, Hertz", along, closed, "line", colour, entry=entry))
-    title, case = "Pressure at three sections", case_of(group).label
+def _middle(group: Group) -> Chart:
+    """Pressure along the middle."""
+    x, p = values(group, "x", UM), values(group, "pressure")[:, len(group["y"].data) // 2]
+    a, p0 = scalar(group, "hertz_radius"), scalar(group, "hertz_max_pressure")
+    inside = np.abs(x) <= _window(group)
+    traces = [Trace("computed", x[inside], p[inside], "points")]
+    if a and p0:
+        along = np.linspace(-1.0, 1.0, _ACROSS)
+        closed = p0 * np.sqrt(1.0 - along**2)
+        traces.append(Trace("Hertz", a * UM * along, closed, closed=True))
+    title, case = "Pressure along y = 0", case_of(group).label
     return Chart(title, _X_UM, _PRESSURE, tuple(traces), case=case, figure="pressure_sections")
 
 

@@ -194,15 +194,6 @@ def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
 
 # -- effects ---------------------------------------------------------------------------------------
 
-#: whether the contact is curved -> how its set is found, and why displacements are small
-_GAP = {
-    True: "the gap is curved: the contact set depends on the load",
-    False: "edges may lift off; one linear solve when none does",
-}
-_SMALL = {
-    True: "the contact is small against the body",
-    False: "the approach is small against the patch",
-}
 _FROZEN = "normal forces stay frozen under shear: exact for half-spaces of like materials alone"
 
 
@@ -216,7 +207,7 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
     loaded
         Whether any normal load presses the bodies: an effect left out then changes a number.
     """
-    curved, contact, either = is_curved(scene), scene.contact, Effect.either
+    contact, either, two = scene.contact, Effect.either, scene.slip_directions == 2
     inside = ", ".join(_inside(scene))
 
     def switched(name: str, on: bool, why: str, switch: str) -> Effect:
@@ -224,16 +215,17 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
         check = name if loaded and not on else ""
         return Effect(name, on, why, check, () if on else (switch,), on or loaded)
 
-    effects = [Effect("unilateral contact", True, _GAP[curved])]
-    if not curved:
+    effects = [Effect("unilateral contact", True, "the contact set depends on the load")]
+    if not is_curved(scene):
         free = contact.tilt == "free"
         tilt = "no moment about the load line" if free else "its distant set only translates"
         effects.append(switched(TILT, free, tilt, "contact.tilt=free"))
     if friction_on(scene):
         outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
+        slip = "asked for, or with the coupling" if two else "each load has one direction"
         effects += [
             Effect("friction", True, f"mu = {contact.friction:g} and the outputs {outputs}"),
-            switched(DIRECTIONS, *_directions(scene), "contact.directions=2"),
+            switched(DIRECTIONS, two, slip, "contact.directions=2"),
         ]
     else:
         asked = scene.wants(*FRICTION_WANTS)
@@ -249,16 +241,8 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
         either("mirror symmetry", symmetry != "full", why, why),
         either("internal displacement", bool(inside), displaced, unasked),
         either("inertia", False, "", "every output is static: M is not assembled"),
-        either("large displacement", False, "", _SMALL[curved]),
+        either("large displacement", False, "", "the approach is small against the bodies"),
     )
-
-
-def _directions(scene: Scene) -> tuple[bool, str]:
-    """Whether slip has two directions, and why."""
-    if scene.slip_directions == 2:
-        return True, "pressure and shear are solved at once" if scene.coupled else "asked for"
-    curved = is_curved(scene)
-    return False, "the load has one direction" if curved else "loads run along the axes"
 
 
 def _inside(scene: Scene) -> list[str]:

@@ -247,11 +247,12 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float) -> N
     if not curved or scene.wants("stiffness"):
         case.stuck[direction] = way.stuck()
     loads = scene.loads.tangential if scene.wants("tangential") else ()
-    # Flat faces go on to gross slip, for a curve.
-    shares = PATH_SHARES[max(loads, default=0.0) > PATH_SHARES] if curved else PATH_SHARES
-    if loads or (scene.wants("tangential") and not curved):
-        few = curved and case.state is None
-        ratios = np.unique(np.concatenate([[] if few else shares, loads]))
+    shares = PATH_SHARES
+    if curved:
+        # Only where the pressure follows the shear does the way to a load matter.
+        shares = shares[max(loads, default=0.0) > shares] if case.state else shares[:0]
+    if scene.wants("tangential") and (loads or not curved):
+        ratios = np.unique(np.concatenate([shares, loads]))
         load, moved, at = way.march(ratios)
         if not curved:
             solution.paths.append(LoadPath(solution.sheared_case(case, direction), load, moved))
@@ -278,9 +279,7 @@ class Frozen:
         self.loaded = np.flatnonzero(force > 0.0)
         self.limit = self.friction * force[self.loaded]
         #: mu N on the model
-        self.total = float(self.limit.sum())
-        if solution.curved:
-            self.total = self.friction * case.force / self.copies
+        self.total = self.friction * case.force / self.copies
 
     def _found(
         self,
@@ -292,11 +291,9 @@ class Frozen:
         state: CoupledState | None = None,
     ) -> TangentialCase:
         """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
-        # with the motion across the load held, or free to follow; 0 where nothing holds
-        tangent = float(K[0, 0])
-        if not self.solution.curved:
-            free = np.linalg.pinv(K, hermitian=True)
-            tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
+        # with the motion across the load free to follow; 0 where nothing holds
+        free = np.linalg.pinv(K, hermitian=True)
+        tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
         case = self.solution.sheared_case(self.case, self.direction, ratio)
         load = ratio * self.friction * self.case.force
         return TangentialCase(
@@ -415,7 +412,7 @@ class _Coupled(Frozen):
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
         super().__init__(solution, case, direction)
         assert case.state is not None
-        self.state, self.total = case.state, self.friction * case.force
+        self.state = case.state
 
     def stuck(self) -> tuple[float, dict[str, float]]:
         """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
