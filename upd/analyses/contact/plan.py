@@ -161,6 +161,7 @@ def choose_symmetry(scene: Scene) -> tuple[str, str]:
         "slip in two directions is solved on the full model": two and not scene.coupled,
         "the damper may tilt about both axes": scene.contact.tilt == "free",
         "the pads have unequal heights": scene.geometry.get("pad_offset", 0.0) != 0.0,
+        "a damper's face has one mirror plane": asked == "quarter" and not is_curved(scene),
     }
     reasons = "; ".join(why for why, applies in hindered.items() if applies)
     if asked not in ("auto", "full") and reasons:
@@ -421,10 +422,6 @@ def make_plan(scene: Scene) -> ContactPlan:
 def _require_fitting(scene: Scene) -> None:
     """Raise InputError for what a flat contact does not take."""
     problems = []
-    if scene.mesh.symmetry == "quarter":
-        problems.append(
-            'mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"'
-        )
     axes = {component(d) for d in scene.loads.directions}
     if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
         problems.append(
@@ -465,8 +462,7 @@ def contact_plan(
     if recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is reported before anything is written.
         require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
-    products = [(family, _products(scene, on, family)) for family in families]
-    _add_bodies(cost, scene, products, recipes.weighted_sets(scene.recipe, parameters))
+    _add_bodies(cost, families, recipes.weighted_sets(scene.recipe, parameters))
     _add_loads(cost, scene, on)
     # The internal displacement takes the factors of all bodies again.
     needs = cost.in_a_row(keep="internal displacement" in on)
@@ -477,44 +473,39 @@ def contact_plan(
 
 
 def _add_bodies(
-    cost: CostModel,
-    scene: Scene,
-    products: Sequence[tuple[Family, int]],
-    weighted: Mapping[str, Sequence[str]],
+    cost: CostModel, families: Sequence[Family], weighted: Mapping[str, Sequence[str]]
 ) -> None:
-    """Bodies meshed and condensed.
+    """Bodies meshed and condensed, or learned from products.
 
     Parameters
     ----------
-    products
-        A family of loads, and about how many it takes where they may serve instead of a
-        condensation.
     weighted
         Body -> its sets with weights, which hold it in the mean.
     """
+    scene: Any = cost.scene
     for count in cost.size.values():
         cost.contact_body(count)
     # what every task keeps is held at once: an equal share of the memory each
-    room = (memory_limit(scene) - cost.kept_bytes) / (len(cost.size) * len(products))
+    room = (memory_limit(scene) - cost.kept_bytes) / (len(cost.size) * len(families))
     for body, count in cost.size.items():
         chosen = scene.contact.distant.get(body)
         in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
-        for family, number in products:
+        for family in families:
             task, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
             if is_curved(scene) and not scene.coupled and not in_mean:
-                cost.contact(task, count, n_kept, number, room)
+                cost.contact(task, count, n_kept, _products(scene, family), room)
             else:
                 cost.condensed(task, count, n_kept)
-        for family, _ in products if in_mean else ():
-            cost.held_in_mean(f"{body}, {family.label}", count)
+            if in_mean:
+                cost.held_in_mean(task, count)
 
 
 # A cycle takes the products of so many loads.
 _CYCLE_CASES = 4
 
 
-def _products(scene: Scene, on: Collection[str], family: Family) -> int:
-    """Products that a family of loads takes about, with the effects ``on``."""
+def _products(scene: Scene, family: Family) -> int:
+    """Products that a family of loads takes about."""
     loads, cases = len(scene.loads.normal), 0
     if NORMAL in family.components:
         cases += loads * (3 if scene.wants("stiffness") else 1)
