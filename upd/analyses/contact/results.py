@@ -291,31 +291,21 @@ def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Res
 
 
 def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    """Where the pressure peaks. Without lattice lines no peak is sought, and none is counted."""
-    if case.force <= 0.0 or not all(k.quads is None for k in solution.lattices.values()):
-        return []
-    peaks = pressure_peaks(solution, case)
-    out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
-    for i, (x, y) in enumerate(peaks):
-        out.append(q.PRESSURE_PEAK_X.of(x, case.case, n=i + 1))
-        out.append(q.PRESSURE_PEAK_Y.of(y, case.case, n=i + 1))
-    return out
-
-
-def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[float, float]]:
-    """Where the pressure peaks, report axes in mm.
-
-    Middle at half height of each peak of the force per length, centre of force across it.
+    """Where the pressure peaks, report axes in mm: middle at half height of each peak of the force
+    per length, centre of force across it.
 
     The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
     A peak stands out by a tenth of the largest value. Without lattice lines there is no force per
-    length, and no peak is sought.
+    length: no peak is sought, and none is counted.
     """
     # slow to import: only where it is called
     from scipy.signal import find_peaks, peak_widths
 
-    found, origin = [], solution.corner
-    for lattice in (k for k in solution.lattices.values() if k.quads is None):
+    faces = solution.lattices.values()
+    if case.force <= 0.0 or not all(k.quads is None for k in faces):
+        return []
+    found: list[Array] = []
+    for lattice in faces:
         force = lattice.whole(case.solution.force, extensive=True)[1:-1]
         # normal force per length along x, N/mm: over the length each column stands for
         X, lengths = lattice.X[1:-1], lattice.area().sum(axis=1)[1:-1] / np.ptp(lattice.Y)
@@ -326,8 +316,12 @@ def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[fl
         for begin, end in zip(left, right, strict=True):
             inside = (places >= begin) & (places <= end)
             middle, across = np.interp([begin, end], places, X).mean(), force[inside].sum(axis=0)
-            found.append((middle - origin[0], float(across @ lattice.Y / across.sum()) - origin[1]))
-    return [(float(x), float(y)) for x, y in found]
+            found.append(np.array([middle, across @ lattice.Y / across.sum()]) - solution.corner)
+    out = [q.PRESSURE_PEAKS.of(len(found), case.case)]
+    for i, (x, y) in enumerate(found):
+        out.append(q.PRESSURE_PEAK_X.of(x, case.case, n=i + 1))
+        out.append(q.PRESSURE_PEAK_Y.of(y, case.case, n=i + 1))
+    return out
 
 
 def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
@@ -364,36 +358,22 @@ def contact_law(solution: ContactSolution, case: NormalCase) -> ContactLaw | Non
     # Shared out like the pressure, which pushes everywhere; stiffness fields may pull at single
     # nodes, which no spring can. The total is that with the tilt held: the tilt is the dynamic
     # body's own.
-    share = force / force.sum()
+    faces = list(solution.lattices.values())
+    share = np.concatenate([k.whole(force / force.sum(), extensive=True).ravel() for k in faces])
     answer = case if both else case.alone[upper]
-    totals = [share * answer.solution.stiffness, share * sheared(0.0), share * sheared(90.0)]
-    points, areas, fields, patches = _whole(solution, [force, *totals])
-    preload, k_n, k_x, k_y = fields
+    points = [k.points() for k in faces]
+    ends = np.cumsum([len(one) for one in points])
     return contact_points(
-        points,
-        areas,
-        preload,
-        k_n,
-        np.column_stack([k_x, k_y]),
+        np.vstack(points),
+        np.concatenate([k.area().ravel() for k in faces]),
+        share * force.sum(),
+        share * answer.solution.stiffness,
+        np.outer(share, [sheared(0.0), sheared(90.0)]),
         choice.rows,
         choice.columns,
         choice.weight,
-        patches,
+        np.split(np.arange(ends[-1]), ends[:-1]),
     )
-
-
-def _whole(
-    solution: ContactSolution, fields: list[Array]
-) -> tuple[Array, Array, list[Array], list[NDArray[np.int64]]]:
-    """Points, areas and extensive fields of the whole contact, and the nodes of each patch in
-    them.
-    """
-    faces = list(solution.lattices.values())
-    points = [k.points() for k in faces]
-    ends = np.cumsum([len(one) for one in points])
-    whole = [np.concatenate([k.whole(f, extensive=True).ravel() for k in faces]) for f in fields]
-    areas = np.concatenate([k.area().ravel() for k in faces])
-    return np.vstack(points), areas, whole, np.split(np.arange(ends[-1]), ends[:-1])
 
 
 # -- tangential loads ------------------------------------------------------------------------------
