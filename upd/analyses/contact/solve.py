@@ -379,9 +379,11 @@ class Frozen:
         gross = np.zeros(len(C))
         gross[: len(self.limit)] = self.limit
         found = [(self._moved(C)[0], KNOWN_STIFFNESS), (gross, KNOWN)]
-        for ratio in scene.loads.tangential if scene.wants("tangential") else ():
+        history = None
+        for ratio in sorted(scene.loads.tangential) if scene.wants("tangential") else ():
             target = ratio * self.total * (self.unit if len(self.unit) == 2 else self.unit[0])
-            one = tangential_contact(C, self.limit, load=target)
+            one = tangential_contact(C, self.limit, load=target, history=history)
+            history = one.history
             found.append((one.force, KNOWN))
             found += [(one.rates, KNOWN_STIFFNESS)] if one.rates is not None else []
         if scene.wants("cycle"):
