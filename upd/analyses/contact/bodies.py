@@ -29,8 +29,6 @@ from upd.cache.sources import key_of, source_digest
 from upd.contact import bulk
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.contact.products import (
-    ROUGH,
-    centre,
     energy_error,
     half_space_start,
     learners,
@@ -222,16 +220,7 @@ def _by_products(
         if name == "amg"
         else DirectSolver(K, name)
     )
-    points = mesh.points[body.contact]
-    node = centre(points, held)
-    measured: dict[int, tuple[int, Array]] = {}
-    if node is not None:
-        places = np.split(kept, len(family.components))
-        for component, own in zip(family.components, places, strict=True):
-            load = np.zeros(len(free))
-            load[own[node]] = 1.0
-            measured[component] = (node, solver(load, ROUGH).x[own])
-    start = half_space_start(points, family.components, held, data.E, data.nu, measured)
+    start = half_space_start(mesh.points[body.contact], family.components, held, data.E, data.nu)
     return LearnedCompliance(solver, len(free), kept, start)
 
 
