@@ -12,18 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.face_charts import face_chart, face_pressure, values
 from upd.plot.chart import Axis, Band, Chart, Map, Scatter, Trace
 from upd.plot.common import (
     UM,
     case_of,
     circle,
     cut,
-    face_chart,
-    face_pressure,
     pressure_map,
     scalar,
     state_map,
-    values,
     with_content,
 )
 from upd.results import Arrays, Case, Group

@@ -7,18 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.face_charts import face_chart, face_pressure, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.plan import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Axis, Chart, Map, Style, Trace
-from upd.plot.common import (
-    UM,
-    case_of,
-    face_chart,
-    face_pressure,
-    lattice,
-    values,
-    with_content,
-)
+from upd.plot.common import UM, case_of, lattice, with_content
 from upd.results import Arrays, Group
 from upd.scene.forced_contact import SIDES
 
