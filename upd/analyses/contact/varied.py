@@ -428,8 +428,9 @@ _DIVISIONS, _STUDY_SHARES = (12, 16, 20, 28, 40, 56), (0.5, 0.67, 1.0, 1.34, 1.6
 #: usual accuracies in per cent, of a curved contact (3 % takes 7 GB on the ready sphere, 2 % 24 GB)
 #: and of a flat one
 _ACCURACIES, _FLAT_ACCURACIES = (40.0, 10.0, 3.0), (20.0, 10.0, 5.0)
-#: numbers of the table of what moves the stiffness
-_STIFFNESSES = ("K_N_secant_raw", "K_N_*_alone", "K_T?_initial_raw", "K_*_per_pad")
+#: numbers of the table of what moves the stiffness, of one pad where the contact is two
+_STIFFNESSES = ("K_N_secant_raw", "K_N_*_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
+_PER_PAD = ("K_N_per_pad", "K_N_*_alone", "K_Tx_per_pad", "K_Ty_per_pad")
 #: lengths of a recipe, and times of them that are tried
 _FACTORS = {
     **dict.fromkeys(("margin", "thickness"), (0.25, 0.5, 1.5)),
@@ -548,7 +549,7 @@ def _stiffnesses(scene: object, solved: Sequence[SolvedPoint], names: Sequence[s
     """Stiffnesses of every point at its first normal load."""
     del scene, names
     first: dict[str, Key] = {}
-    for key in matching(solved, _STIFFNESSES):
+    for key in matching(solved, _PER_PAD if matching(solved, _PER_PAD[:1]) else _STIFFNESSES):
         first.setdefault(key[0], key)
     table = points_table(solved, list(first.values()))
     return StudyReport((table,), bool(without_failed(solved)))
