@@ -47,7 +47,7 @@ from upd.contact.normal import NormalContact, normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
 from upd.contact.tangential import TangentialPath
 from upd.contact.tilt import tilted_contact
-from upd.errors import UpdError
+from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
 from upd.results import quantities as q
@@ -491,25 +491,30 @@ def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Res
         model = prepare(companion, Stages(), "companion")
         without = _numbers(companion, model)
     for effect in solution.plan.shown:
-        included = dict[Key, float]()
-        with suppress(UpdError, np.linalg.LinAlgError):
+        included, tips = dict[Key, float](), False
+        try:
             if model is not None:
                 found = _numbers(companion, model, _SWITCHES[effect])
                 included = {(r.name, r.case): r.value for r in found}
-        yield from _changes(effect, without, included)
+        except (UpdError, np.linalg.LinAlgError) as error:
+            tips = isinstance(error, InputError)
+        yield from _changes(effect, without, included, tips=tips)
 
 
 def _changes(
-    effect: str, without: Sequence[Result], included: Mapping[Key, float]
+    effect: str, without: Sequence[Result], included: Mapping[Key, float], *, tips: bool
 ) -> Iterator[Resolved]:
-    """The numbers that an effect changes; NaN where none was found with it."""
+    """The numbers that an effect changes; NaN where none was found with it, and no stiffness where
+    the body tips over.
+    """
     areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
     known = [r for r in without if (r.name, r.case) in included or not included]
     had = {r.name for r in known}
     names = next((row for row in _SHOWN[effect] if had.intersection(row)), ())
     names += _AREAS if effect == planned.COUPLING else ()
     for r in (one for one in known if one.name in names):
-        value, area = included.get((r.name, r.case), float("nan")), areas.get(r.case.load, 0.0)
+        none = 0.0 if tips and r.unit == "N/mm" else float("nan")
+        value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
         over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
         yield Resolved(effect, r.name, r.case, r.value, value, r.unit, over=over)
 
