@@ -379,9 +379,9 @@ def _patch_problem(scene: Scene, mesh: Mesh) -> str:
     if is_curved(scene) and len(patches) > 1:
         return (
             f"the node sets {', '.join(patches)} are {len(patches)} patches, a curved contact has "
-            "one; to fix it: name the set 'contact' alone or, when the faces are flat, write "
-            'ANALYSIS = "flat contact" into the recipe, or bring the contact nodes of a mesh file '
-            "into one plane"
+            'one; to fix it: write ANALYSIS = "flat contact" into the recipe, or bring the contact '
+            "nodes of a mesh file into one plane, when the faces are flat; or name the set "
+            "'contact' alone"
         )
     named = np.concatenate([mesh.nodes[name] for name in patches]) if patches else np.zeros(0, int)
     if patches and not np.array_equal(np.sort(named), np.sort(mesh.nodes["contact"])):
