@@ -13,8 +13,7 @@ import pytest
 import upd
 from upd.analyses import make_plan as make_any_plan
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.plan import NORMAL
-from upd.analyses.contact.scene_plan import make_plan
+from upd.analyses.contact.plan import NORMAL, make_plan
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
 from upd.contact.products import (

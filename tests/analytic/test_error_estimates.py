@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from upd.analyses.contact.scene_plan import make_plan
+from upd.analyses.contact.plan import make_plan
 from upd.analyses.contact.varied import PROBLEM
 from upd.errors import InputError
 from upd.progress import Stages

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import upd
-from upd.analyses.contact.scene_plan import make_plan
+from upd.analyses.contact.plan import make_plan
 from upd.analyses.contact.solution import ContactSolution
 from upd.analyses.contact.solve import solve_plan
 from upd.contact.bulk import finite_body_share, half_space_mean

@@ -14,10 +14,8 @@ import numpy as np
 import pytest
 
 from upd.analyses.contact.bodies import pressed
-from upd.analyses.contact.loading import load_point, tilt_arms
-from upd.analyses.contact.plan import refined_growth
-from upd.analyses.contact.scene_plan import make_plan
-from upd.analyses.contact.solution import ContactSolution
+from upd.analyses.contact.plan import make_plan, refined_growth
+from upd.analyses.contact.solution import ContactSolution, load_point, tilt_arms
 from upd.analyses.contact.solve import solve_plan
 from upd.progress import Stages
 from upd.scene import load_scene

@@ -15,8 +15,7 @@ from scipy.sparse import block_array
 from scipy.sparse.linalg import spsolve
 
 import upd
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL
-from upd.analyses.contact.scene_plan import make_plan
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, make_plan
 from upd.analyses.contact.solution import ContactSolution
 from upd.analyses.contact.solve import solve_plan as solve
 from upd.contact.model import Body, free_dofs

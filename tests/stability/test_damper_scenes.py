@@ -163,7 +163,7 @@ def test_pads_at_unequal_height_touch_one_after_the_other() -> None:
 
 def test_printed_stiffness_is_that_of_one_pad() -> None:
     """From its section 8.4 on the thesis looks at one of the two pads alone."""
-    result = run("asymmetric", loads__normal=["303 N"], want=["normal", "stiffness", "curve"])
+    result = run("asymmetric", loads__normal=["303 N"], want=["normal", "stiffness"])
     label = "F=303 N"
     approach = 1e-3 * result.value("approach", label)
     for side in ("left", "right"):
@@ -177,10 +177,6 @@ def test_printed_stiffness_is_that_of_one_pad() -> None:
     assert by_name["K_N_per_pad"].reference == 4.71e5
     assert by_name["K_N_per_pad"].source == "thesis, Table XII"
     assert by_name["K_N_secant_raw"].reference is None
-    # the curve is of both pads together, and so is the line drawn beside it
-    slope = result.arrays["force-approach"]["printed_stiffness"]
-    assert float(slope[1]) == 2 * 4.71e5
-    assert slope[2]["source"] == "thesis, Table XII, 2 pads"
     assert not any(r.name.endswith("_per_pad") for r in run(want=["stiffness"]).rows)
 
 

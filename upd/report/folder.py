@@ -28,7 +28,7 @@ _LOG_LINE = re.compile(
 _VERSIONS = "versions: "
 #: key of a JSON file: SHA-256 of what else it has
 _DIGEST = "sha256"
-#: names of the figures a run may leave, without their ending
+#: names of the figures a run may leave or left once, without their ending
 _FIGURES = (
     "pressure pressure_sections force_approach over_load stick_slip traction hysteresis "
     "contact_open surface force_displacement contact_law response response_harmonics damping "

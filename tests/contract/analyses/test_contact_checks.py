@@ -20,7 +20,7 @@ import pytest
 import upd
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.contact import plan as left_out
-from upd.analyses.contact.loading import Sheared
+from upd.analyses.contact.solution import Sheared
 from upd.progress import Stages
 from upd.results import Check
 from upd.scene import as_scene
@@ -301,12 +301,6 @@ def test_a_spoiled_answer_fails_exactly_its_check(analysis: str, toy: str, name:
     assert before <= {"resolution"}  # a toy is coarse
     SPOILERS[analysis, toy, name](solution)
     assert failures(toy, solution) - before == {name} - before
-
-
-def test_an_effect_left_out_without_its_check_fails() -> None:
-    solution = fresh("damper")
-    solution.left_out = [one for one in solution.left_out if one.effect != left_out.TILT]
-    assert failures("damper", solution) == {left_out.TILT}
 
 
 def test_every_check_of_a_contact_has_a_spoiler() -> None:

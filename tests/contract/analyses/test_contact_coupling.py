@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.contact.loading import shear_nodes
 from upd.analyses.contact.plan import COMPONENTS, ContactPlan
+from upd.analyses.contact.solution import shear_nodes
 from upd.contact import coupled_contact
 from upd.errors import InputError
 from upd.progress import Stages

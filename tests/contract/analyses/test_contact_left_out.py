@@ -19,8 +19,8 @@ from scipy.sparse.linalg import splu
 import upd
 from upd.analyses import make_plan
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.loading import raised
 from upd.analyses.contact.plan import ContactPlan
+from upd.analyses.contact.solution import raised
 from upd.contact.model import ContactModel
 from upd.fem import rigid_body_modes
 from upd.progress import Stages

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from upd.analyses.contact.plan import make_plan
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solve import solve_plan
 from upd.analyses.contact.varied import levels, sample
 from upd.progress import Stages

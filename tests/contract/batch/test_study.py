@@ -52,7 +52,7 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     assert {name: files(tmp_path)[name] for name in stamps} == stamps, (
         "a finished point was run again"
     )
-    assert [progress.label for progress in seen if progress.label] == ["hex8i 16 x 16"]
+    assert [progress.label for progress in seen if progress.label] == ["hex8i 16 divisions"]
     curves = make_curves(again.solved, ["max_pressure", "radius_moment", "approach"])
     assert {c.name for c in curves} == {"max_pressure", "radius_moment", "approach"}
     approach = next(c for c in curves if c.name == "approach")

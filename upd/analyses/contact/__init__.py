@@ -5,20 +5,14 @@ dynamic model. Which one it is the recipe declares.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
 
 from upd.analyses.base import Analysis
 from upd.analyses.contact import charts, checks, output, results
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.solve import solve_left_out
 from upd.analyses.contact.varied import LADDERS, PROBLEM, coarsened
-from upd.plot.chart import Chart
-from upd.results import Arrays
 
-#: arrays, summary -> charts
-Charts = Callable[[Arrays, Mapping[str, Any]], list[Chart]]
 _INPUT_CHECKS = (
     "patch rim",
     "Dundurs beta",
@@ -26,8 +20,8 @@ _INPUT_CHECKS = (
 )
 
 
-def _analysis(name: str, headline: tuple[str, ...], make_charts: Charts, *, last: bool) -> Analysis:
-    """``last``: whether the main numbers are those of the last load, not of the first."""
+def _analysis(name: str, headline: tuple[str, ...], *, curved: bool) -> Analysis:
+    """The main numbers of a curved contact are those of its last load, of flat faces the first."""
     return Analysis(
         name=name,
         headline_names=headline,
@@ -38,10 +32,10 @@ def _analysis(name: str, headline: tuple[str, ...], make_charts: Charts, *, last
         arrays=output.arrays,
         sizes=output.sizes,
         write_files=output.write_files,
-        charts=make_charts,
-        headline=partial(results.pick, names=headline, last=last),
+        charts=partial(charts.contact_charts, curved=curved),
+        headline=partial(results.pick, names=headline, last=curved),
         ladders=LADDERS,
-        verdict_names=() if last else ("K_N_per_pad", "K_N_secant_raw", "approach"),
+        verdict_names=() if curved else ("K_N_per_pad", "K_N_secant_raw", "approach"),
         solve_left_out=solve_left_out,
         coarsened=coarsened,
     )
@@ -51,7 +45,7 @@ def _analysis(name: str, headline: tuple[str, ...], make_charts: Charts, *, last
 ANALYSES = {
     one.name: one
     for one in (
-        _analysis("hertz", results.CURVED_HEADLINE, charts.curved_charts, last=True),
-        _analysis("flat", results.FLAT_HEADLINE, charts.flat_charts, last=False),
+        _analysis("hertz", results.CURVED_HEADLINE, curved=True),
+        _analysis("flat", results.FLAT_HEADLINE, curved=False),
     )
 }

@@ -29,12 +29,9 @@ from upd.cache.sources import key_of, source_digest
 from upd.contact import bulk
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.contact.products import (
-    ROUGH,
-    centre,
     energy_error,
     half_space_start,
     learners,
-    normal_contact_by_products,
 )
 from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
@@ -157,14 +154,6 @@ def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
     return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
 
 
-def held_sets(mesh: Mesh) -> list[str]:
-    """Names of the distant sets that can hold a body: fewer than three nodes leave it free to
-    turn.
-    """
-    sets = [key for key, nodes in mesh.nodes.items() if len(nodes) > 2]
-    return [key.removeprefix("distant_") for key in sets if key.startswith("distant_")]
-
-
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
     data = plan.scene.materials[name]
     material = Material(data.E, data.nu, data.density)
@@ -231,16 +220,7 @@ def _by_products(
         if name == "amg"
         else DirectSolver(K, name)
     )
-    points = mesh.points[body.contact]
-    node = centre(points, held)
-    measured: dict[int, tuple[int, Array]] = {}
-    if node is not None:
-        places = np.split(kept, len(family.components))
-        for component, own in zip(family.components, places, strict=True):
-            load = np.zeros(len(free))
-            load[own[node]] = 1.0
-            measured[component] = (node, solver(load, ROUGH).x[own])
-    start = half_space_start(points, family.components, held, data.E, data.nu, measured)
+    start = half_space_start(mesh.points[body.contact], family.components, held, data.E, data.nu)
     return LearnedCompliance(solver, len(free), kept, start)
 
 
@@ -302,16 +282,6 @@ def product_checks(
     ]
 
 
-def show_normal(model: ContactModel, loads: Sequence[float]) -> None:
-    """Show bodies that learn the forces of the normal loads in N on the model, one after the other.
-
-    Raises ConvergenceError where a product does not converge.
-    """
-    mask = None
-    for load in sorted(loads, reverse=True) if learns(model) else ():
-        mask = normal_contact_by_products(model, load=load, start=mask).contact
-
-
 # -- displacements inside --------------------------------------------------------------------------
 
 
@@ -320,20 +290,16 @@ def solve_inside(solution: ContactSolution) -> None:
     they have an axis.
     """
     sphere = solution.plan.scene.sphere_radius is not None
-    for case in solution.normal:
-        frictionless = _displaced(solution, case, sphere)
-        if sphere and case.force > 0.0:
-            _add_shares(solution, case, frictionless)
-
-
-def _displaced(solution: ContactSolution, case: NormalCase, sphere: bool) -> dict[str, Array]:
-    """Keep the displacements; those without friction, which go with the load, are returned."""
     model, copies = solution.model, solution.plan.copies
-    forces = case.solution.force if case.state is None else case.state.force
-    case.displacement, case.reaction = pressed(model, forces, copies)
-    if case.state is None or not sphere:
-        return case.displacement
-    return pressed(model, case.solution.force, copies)[0]
+    for case in solution.normal:
+        forces = case.solution.force if case.state is None else case.state.force
+        case.displacement, case.reaction = pressed(model, forces, copies)
+        if sphere and case.force > 0.0:
+            # without friction it goes with the load
+            frictionless = case.displacement
+            if case.state is not None:
+                frictionless = pressed(model, case.solution.force, copies)[0]
+            _add_shares(solution, case, frictionless)
 
 
 def _add_shares(

@@ -14,13 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import conditions
-from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.faces import lattices, on_lines, rim_nodes, tractions
-from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    LoadPath,
+    NormalCase,
+    Sheared,
+    TangentialCase,
+    as_normal,
+    contact_points_of,
+    opened_by_shear,
+    shear_nodes,
+    tangential_compliance,
+    tilt_arms,
+)
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
+from upd.contact.patch import Patch
 from upd.contact.subsurface import most_stressed, partial_slip_ratio
 from upd.mesh import recipes
 from upd.reference import hertz_yield_load, hertz_yield_point
@@ -103,7 +114,7 @@ def normal_checks(
     ]
 
 
-def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> list[Check]:
+def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check]:
     """Coulomb's law node by node, and the balance, after one tangential load step.
 
     The slip is made again from the compliance, dw = d - C t - w_before: none where a node sticks;
@@ -111,7 +122,7 @@ def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> li
     (K. L. Johnson, Contact Mechanics, 1985, section 7.2).
     """
     n, k = len(t.loaded), len(t.components)
-    C = loading.tangential_compliance(model, t.components, t.loaded)
+    C = tangential_compliance(model, t.components, t.loaded)
     allowed, diagonal = rounding(k * n), np.diagonal(C)
     force = t.force.reshape(k, n)
     row = np.sqrt(diagonal * diagonal.max())
@@ -145,7 +156,7 @@ def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> li
     )
 
 
-def _loop_check(path: loading.LoadPath) -> Check:
+def _loop_check(path: LoadPath) -> Check:
     """Area of a cycle's loop against the work of slip; where nothing slips, against the product of
     the largest load and displacement.
     """
@@ -155,46 +166,37 @@ def _loop_check(path: loading.LoadPath) -> Check:
     return Check("loop area", path.case, error, 1e-2, "|loop area / slip work - 1|", remedy)
 
 
-def _left_out_checks(solution: ContactSolution) -> list[Check]:
-    """Of the effects left out; they carry the names the plan gives them."""
+def _left_out_checks(solution: ContactSolution) -> Iterator[Check]:
+    """Of the effects left out, which carry the names the plan gives them; of what materials do.
+
+    Bodies of finite shape couple normal and tangential contact whatever their materials: nearly
+    not at all where the contact is small against both, much where it is as large as they are.
+
+    hex8 holds the volume at eight points (T. J. R. Hughes, The Finite Element Method, 2000, section
+    4.3: volumetric locking). The ready sphere under 200 N with 24 divisions: its largest pressure
+    is +0.3, 0.7, 1.9, 5.3, 10, 56, 233 % off Hertz with nu = 0.3, 0.4, 0.45, 0.48, 0.49, 0.499,
+    0.4999; hex8i's -0.4 to -2.1 %.
+    """
     plan, scene = solution.plan, solution.plan.scene
-    checks = [one.check(scene.left_out, REMEDIES[one.effect]) for one in solution.left_out]
+    for one in solution.left_out:
+        yield one.check(scene.left_out, REMEDIES[one.effect])
     if plan.effect("friction") and not scene.coupled:
-        checks.append(_coupling_check(scene))
+        what = "|beta|: how much pressure shears half-spaces of unlike materials"
+        remedy = (
+            "pressure shears the contact of these materials, which the tangential numbers leave "
+            'out: set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
+        )
+        limit = scene.contact.coupling_limit
+        yield _warning("Dundurs beta", NO_CASE, beta_of(scene), limit, what, remedy)
     if scene.mesh.element == "hex8":
-        checks.append(_locking_check(solution))
-    return checks
-
-
-def _coupling_check(scene: Scene) -> Check:
-    """How far the materials are from shearing a contact of half-spaces by pressure alone.
-
-    Bodies of finite shape couple the two problems whatever their materials: nearly not at all
-    where the contact is small against both, much where it is as large as they are.
-    """
-    what = "|beta|: how much pressure shears half-spaces of unlike materials"
-    remedy = (
-        "pressure shears the contact of these materials, which the tangential numbers leave out: "
-        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
-    )
-    return _warning(
-        "Dundurs beta", NO_CASE, beta_of(scene), scene.contact.coupling_limit, what, remedy
-    )
-
-
-def _locking_check(solution: ContactSolution) -> Check:
-    """Volume that eight integration points hold in a nearly incompressible body.
-
-    The ready sphere under 200 N with 24 divisions: hex8's largest pressure is +0.3, 0.7, 1.9, 5.3,
-    10, 56, 233 % off Hertz with nu = 0.3, 0.4, 0.45, 0.48, 0.49, 0.499, 0.4999; hex8i's -0.4 to
-    -2.1 %. (T. J. R. Hughes, The Finite Element Method, 2000, section 4.3: volumetric locking.)
-    """
-    remedy = (
-        "hex8 locks where a body is nearly incompressible: pressures are more than about 5 % too "
-        'high, and at 0.4999 more than three times the right ones: set mesh.element = "hex8i"'
-    )
-    largest = max(one.nu for one in solution.plan.scene.materials.values())
-    return _warning("locking", NO_CASE, largest, 0.48, "Poisson's ratio of bodies of hex8", remedy)
+        largest = max(one.nu for one in scene.materials.values())
+        remedy = (
+            "hex8 locks where a body is nearly incompressible: pressures are more than about 5 % "
+            "too high, and at 0.4999 more than three times the right ones: set mesh.element = "
+            '"hex8i"'
+        )
+        what = "Poisson's ratio of bodies of hex8"
+        yield _warning("locking", NO_CASE, largest, 0.48, what, remedy)
 
 
 # -- size and place of the contact -----------------------------------------------------------------
@@ -214,27 +216,33 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
+    ways = {"patch": f'"{needed:.3g} mm" or more, or to "auto"'}
+    without = f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
     remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
-    remedy += wider_patch(solution.plan.scene, needed)
-    nodes = rim_nodes(solution, case)
+    remedy += _to_set(solution.plan.scene, ways, without)
+    nodes = solution.rim_nodes(case)
     return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
 
 
+def _to_set(scene: Scene, ways: Mapping[str, str], without: str) -> str:
+    """What to set of the recipe's parameters, and ``without`` any of them what to do."""
+    known = [
+        f"geometry.{name} to {value}"
+        for name, value in ways.items()
+        if recipes.has_parameter(scene.recipe, name)
+    ]
+    return f"set {' or '.join(known)}" if known else without
+
+
 def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
-    scene, radius = solution.plan.scene, case.measures.radius_moment
-    spacing, width = solution.model.patch.spacing, float(np.ptp(solution.model.patch.X))
-    ways = ['geometry.patch to "auto"'] if recipes.has_parameter(scene.recipe, "patch") else []
-    if recipes.has_parameter(scene.recipe, "divisions"):
-        divisions = int(2 * np.ceil(1.5 * width / max(radius, 0.1 * spacing)))
-        ways.append(f"geometry.divisions to {divisions} or more")
-    finer = (
-        f"set {' or '.join(ways)}"
-        if ways
-        else f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
-    )
-    rough = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
-    value, what = 3.0 * spacing / max(radius, 1e-300), "3 h / a (a contact radius, h node spacing)"
-    return _warning("resolution", case.case, value, 1.0, what, rough + finer)
+    patch, radius = solution.model.patch, case.measures.radius_moment
+    divisions = 2 * np.ceil(1.5 * float(np.ptp(patch.X)) / max(radius, 0.1 * patch.spacing))
+    ways = {"patch": '"auto"', "divisions": f"{divisions:.0f} or more"}
+    without = f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
+    remedy = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
+    remedy += _to_set(solution.plan.scene, ways, without)
+    value, what = 3.0 * patch.spacing / max(radius, 1e-300), "3 h / a (a contact radius, h spacing)"
+    return _warning("resolution", case.case, value, 1.0, what, remedy)
 
 
 def _flat_resolution_check(solution: ContactSolution) -> Check:
@@ -245,7 +253,7 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     nodes lie as near as those of two and four hex8i, it is 0.8 % too high and 0.9 % too low.
     """
     edges: list[tuple[int, str]] = []
-    for k in lattices(solution).values():
+    for k in solution.lattices.values():
         lines = (len(k.Y) - 1, len(k.X) - 1)
         if k.quads is not None:
             # of a square of as many elements
@@ -255,29 +263,16 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     scene = solution.plan.scene
     # the multipliers of hex20 sit at its corners
     enough = _ACROSS // 2 if scene.mesh.element == "hex20" else _ACROSS
-    way = (
-        f"set geometry.{name} to {enough} or more"
-        if recipes.has_parameter(scene.recipe, name)
-        else f"mesh the contact with {enough} elements or more along each edge"
-    )
+    without = f"mesh the contact with {enough} elements or more along each edge"
+    way = _to_set(scene, {name: f"{enough} or more"}, without)
     what = f"{enough} / lines of elements across the contact"
     remedy = f"the stiffnesses are wrong by more than about 5 %: {way}"
     return _warning("resolution", NO_CASE, enough / fewest, 1.0, what, remedy)
 
 
-def _curved_checks(solution: ContactSolution) -> list[Check]:
-    """Of a curved contact as a whole: small against its curvature, and split from its bodies."""
-    checks = [_steepness_check(solution)]
-    if solution.no_shares:
-        text, remedy = solution.no_shares, "use a larger or finer body"
-        checks.append(_warning("body compression", NO_CASE, 1, 0, text, remedy))
-    return checks
-
-
-def _steepness_check(solution: ContactSolution) -> Check:
-    """Steepest slope of the undeformed gap at the nodes in contact, over all loads.
-
-    a / R for a sphere.
+def _curved_checks(solution: ContactSolution) -> Iterator[Check]:
+    """Of a curved contact as a whole: steepest slope of the undeformed gap at the nodes in contact
+    over all loads (a / R for a sphere), and whether it was split from its bodies.
     """
     patch = solution.model.patch
     steepness = np.hypot(*patch.slopes(solution.model.gap))
@@ -288,7 +283,10 @@ def _steepness_check(solution: ContactSolution) -> Check:
         "the contact reaches where the faces are too steep for small-displacement theory: lower "
         "the load"
     )
-    return Check("slope in the contact", NO_CASE, slope, 0.2, text, remedy)
+    yield Check("slope in the contact", NO_CASE, slope, 0.2, text, remedy)
+    if solution.no_shares:
+        remedy = "use a larger or finer body"
+        yield _warning("body compression", NO_CASE, 1, 0, solution.no_shares, remedy)
 
 
 # -- onset of yield --------------------------------------------------------------------------------
@@ -303,24 +301,20 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
     """
     scene, model = solution.plan.scene, solution.model
     limited = [b for b in (model.upper, model.lower) if scene.materials[b.name].yield_stress]
-    pressure = model.multipliers.pressure
-    loads: list[tuple[NormalCase | TangentialCase, float, bool, list[Array]]] = [
-        (c, c.force, True, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
-    ]
-    for t in solution.tangential:
-        shear = np.zeros((2, len(t.pressed)))
-        shear[list(t.nodes.components)] = tractions(solution, t)
-        closed = solution.closed_form_traction(t) is not None
-        fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
-        loads.append((t, t.normal.force, closed, fields))
-    for one, force, closed, fields in loads if limited else ():
-        by_hertz = closed and solution.hertz_of(force) is not None
-        faces = [] if by_hertz else [on_lines(k, fields) for k in lattices(solution).values()]
+    pressed = [one for one in solution.normal if one.force > 0.0]
+    cases: list[NormalCase | TangentialCase] = [*pressed, *solution.tangential]
+    for one in cases if limited else ():
+        normal = one.normal if isinstance(one, TangentialCase) else one
+        by_hertz = solution.hertz_of(normal.force) is not None
+        if isinstance(one, TangentialCase):
+            by_hertz = solution.closed_form_traction(one) is not None
+        fields = [] if by_hertz else _fields(solution, one)
+        faces = [] if by_hertz else [on_lines(k, fields) for k in solution.lattices.values()]
         for body in limited:
             limit = scene.materials[body.name].yield_stress
             assert limit is not None
             if by_hertz:
-                stress, what = _hertz_stress(solution, one.case, force, body.name)
+                stress, what = _hertz_stress(solution, one.case, normal.force, body.name)
             else:
                 # the upper body feels the tractions the other way round
                 sign = -1.0 if body is model.upper else 1.0
@@ -328,6 +322,16 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
             what = f"largest von Mises stress / yield stress of {body.name}, {what}"
             case = replace(one.case, body=body.name)
             yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
+
+
+def _fields(solution: ContactSolution, one: NormalCase | TangentialCase) -> list[Array]:
+    """Pressure and, under a tangential load, tractions on the lower body along x and y, MPa."""
+    pressure = solution.model.multipliers.pressure
+    if isinstance(one, NormalCase):
+        return [pressure(one.solution.force)]
+    shear = np.zeros((2, len(one.pressed)))
+    shear[list(one.nodes.components)] = solution.tractions(one)
+    return [pressure(np.maximum(one.pressed, 0.0)), *shear]
 
 
 def _hertz_stress(
@@ -349,6 +353,24 @@ def _hertz_stress(
     # friction never relieves the most stressed place
     stress = max(ratio, worst.ratio) * hertz.max_pressure
     return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
+
+
+def on_lines(patch: Patch, fields: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
+    """Lattice lines and fields of the model's nodes on them; without lines on as many even ones as
+    there are nodes, linear between the nodes and zero off the patch.
+    """
+    whole = [patch.whole(one) for one in fields]
+    if patch.quads is None:
+        return patch.X, patch.Y, whole
+    # slow to import: only where it is called
+    from scipy.interpolate import LinearNDInterpolator
+
+    points = patch.points()
+    n = int(np.ceil(np.sqrt(len(points))))
+    x, y = (np.linspace(v.min(), v.max(), n) for v in points.T)
+    between = LinearNDInterpolator(points, np.column_stack(whole), 0.0)
+    found = between(*np.meshgrid(x, y, indexing="ij"))
+    return x, y, list(np.moveaxis(found, -1, 0))
 
 
 def _half_space_stress(
@@ -389,14 +411,7 @@ def check_solution(solution: ContactSolution) -> list[Check]:
     checks += yield_checks(solution)
     checks += _left_out_checks(solution)
     checks += _curved_checks(solution) if solution.curved else [_flat_resolution_check(solution)]
-    missing = set(solution.plan.shown) - {c.name for c in checks}
-    return [
-        *checks,
-        *(
-            Check(name, NO_CASE, 1, 0, f"the check of {name} was not made", "report this scene")
-            for name in sorted(missing)
-        ),
-    ]
+    return checks
 
 
 def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
@@ -407,17 +422,17 @@ def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
     if solution.curved:
         checks += product_checks(model, case, (NORMAL,), force)
         checks.append(_resolution_check(solution, one))
-    arms = loading.tilt_arms(plan, model)
+    arms = tilt_arms(plan, model)
     turned = np.zeros(len(force)) if one.tilt is None else arms @ one.tilt
     if one.state is not None:
-        nodes = loading.shear_nodes(model, plan.scene.contact.friction, one.state)
+        nodes = shear_nodes(model, plan.scene.contact.friction, one.state)
         checks += tangential_checks(case, model, nodes)
-        turned = turned - loading.opened_by_shear(model, one.state)
+        turned = turned - opened_by_shear(model, one.state)
     carried = plan.copies * float(force.sum())
     checks += normal_checks(case, one.force, one.solution, model, carried, turned, one.reaction)
     if one.tilt is None:
         return checks
-    length = float(np.ptp(loading.contact_points_of(model)[:, :2], axis=0).max())
+    length = float(np.ptp(contact_points_of(model)[:, :2], axis=0).max())
     moment = float(np.abs(arms.T @ force).max()) / (float(force.sum()) * length)
     what = "moment about the load line / (F patch length)"
     return [*checks, *conditions(case, "report this", ("moment balance", moment, 1e-8, what))]
@@ -428,9 +443,9 @@ def _tangential(solution: ContactSolution, t: TangentialCase) -> list[Check]:
     plan, model = solution.plan, solution.model
     checks = tangential_checks(t.case, model, t.nodes)
     if t.state is not None:
-        answer = loading.as_normal(t.state, float("nan"))
-        turned = loading.tilt_arms(plan, model) @ t.state.motion[3:]
-        turned -= loading.opened_by_shear(model, t.state)
+        answer = as_normal(t.state, float("nan"))
+        turned = tilt_arms(plan, model) @ t.state.motion[3:]
+        turned -= opened_by_shear(model, t.state)
         carried = float(answer.unclipped.sum())
         checks += normal_checks(t.case, t.normal.force, answer, model, carried, turned)
     if solution.curved:

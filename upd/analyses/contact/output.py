@@ -11,15 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact import faces
-from upd.analyses.contact.faces import corner, lattices
-from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.results import printed_of
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.results import contact_law
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    LoadPath,
+    NormalCase,
+    TangentialCase,
+)
 from upd.contact.patch import Patch
 from upd.mesh import recipes
-from upd.reference import hertz_pressure, mindlin
-from upd.results import Case, Group, variable
+from upd.reference import mindlin
+from upd.results import Group, variable
 
 Array = NDArray[np.float64]
 Variables = dict[str, Any]
@@ -30,17 +32,14 @@ _BEYOND = 1.3
 
 
 def sizes(solution: ContactSolution) -> dict[str, int]:
-    """Contact pairs of the model and of all patches, mirror images included."""
-    return {
-        "n_pairs": len(solution.model.gap),
-        "n_pairs_whole_patch": sum(k.area().size for k in lattices(solution).values()),
-    }
+    """Contact pairs of the model."""
+    return {"n_pairs": len(solution.model.gap)}
 
 
 def arrays(solution: ContactSolution) -> dict[str, Group]:
     """Fields of every case and patch with their closed forms; curves, paths and contact points."""
     out: dict[str, Group] = {}
-    patches, (x, y) = lattices(solution), corner(solution)
+    patches, (x, y) = solution.lattices, solution.corner
     for patch, k in patches.items():
         face: dict[str, str] = {"patch": patch} if len(patches) > 1 else {}
         # Without a lattice every node has its own x and y.
@@ -53,10 +52,12 @@ def arrays(solution: ContactSolution) -> dict[str, Group]:
             out[name] = Group(lines | fields, content=content, case=case, **face)
     for path in solution.paths:
         content = "cycle" if path.cycle else "path"
+        gross = solution.plan.scene.contact.friction * (path.case.load or 0.0)
+        limit = {"friction_limit": variable("", gross, "N")}
         variables = {
             "displacement": variable("step", path.displacement, "mm"),
             "tangential_force": variable("step", path.load, "N"),
-            **(_deresiewicz(solution, path) if solution.curved else _limit(solution, path)),
+            **(_deresiewicz(solution, path) if solution.curved else limit),
         }
         out[f"{content} {path.case.label}"] = Group(variables, content=content, case=path.case)
     if solution.curve:
@@ -80,7 +81,7 @@ def _normal(solution: ContactSolution, k: Patch, case: NormalCase) -> Variables:
     if case.state is not None:
         traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
         out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
-    return out | _approach_split(case) | _hertz(solution, case) if solution.curved else out
+    return out | _hertz(solution, case)
 
 
 def _sheared(
@@ -97,43 +98,24 @@ def _sheared(
 
 
 def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Variables:
-    traction, XY = faces.tractions(solution, t), _dims(k)
-    out = _sheared(k, traction, list(t.slip.T), t.stick)
-    if solution.curved and len(traction) == 1:
-        # One direction has no dimension of its own.
-        out["traction"] = variable(XY, k.whole(traction[0]), "MPa")
-        out["slip"] = variable(XY, k.whole(t.slip[:, 0]), "mm")
+    out = _sheared(k, solution.tractions(t), list(t.slip.T), t.stick)
     if t.state is not None:
         # which coupled contact moves
         pressure = solution.model.multipliers.pressure(np.maximum(t.pressed, 0.0))
-        out["pressure"] = variable(XY, k.whole(pressure), "MPa")
+        out["pressure"] = variable(_dims(k), k.whole(pressure), "MPa")
     return out | _cattaneo(solution, t)
 
 
 # -- closed forms ----------------------------------------------------------------------------------
 
 
-def _approach_split(case: NormalCase) -> Variables:
-    """The approach, and what the bodies add to it."""
-    out: Variables = {"approach": variable("", case.approach, "mm")}
-    if case.shares:
-        words = "approach of the finite, held bodies"
-        out["finite_body"] = variable("", case.finite_body, "mm", words)
-    return out
-
-
 def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
     hertz = solution.hertz_of(case.force)
     if hertz is None:
         return {}
-    x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
-    pressure = hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure)
     return {
         "hertz_radius": variable("", hertz.radius, "mm"),
-        "hertz_approach": variable("", hertz.approach, "mm"),
         "hertz_max_pressure": variable("", hertz.max_pressure, "MPa"),
-        "hertz_x": variable("hertz_x", x, "mm"),
-        "hertz_pressure": variable("hertz_x", pressure, "MPa"),
     }
 
 
@@ -178,16 +160,11 @@ def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
 
 
 def _curve(solution: ContactSolution) -> Variables:
-    """Force over approach in mm and N, with what goes with the load."""
-    points = solution.curve
-    d, F = (np.array([getattr(p, name) for p in points]) for name in ("approach", "force"))
-    if solution.curved:
-        # It starts where the faces meet.
-        d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
-        own = _approach_over_load(solution, d, F) | _along(solution)
-    else:
-        own = {"stiffness": variable("", solution.normal[0].stiffness, "N/mm")}
-        own |= _printed(solution, "K_N", "_tangent_raw", solution.normal[0].case)
+    """Force over approach in mm and N."""
+    F, d = (np.array(values) for values in zip(*solution.curve, strict=True))
+    # It starts where the faces meet.
+    d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
+    own = _approach_over_load(solution, d, F) if solution.curved else {}
     return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
 
 
@@ -202,48 +179,12 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
     hertz = [h for load in force[1:] if (h := solution.hertz_of(float(load))) is not None]
     if hertz:
         out["hertz_normal_force"] = variable("hertz_point", force, "N")
-        for name, unit in (("area", "mm2"), ("max_pressure", "MPa"), ("approach", "mm")):
-            closed = np.array([0.0, *(getattr(h, name) for h in hertz)])
-            out[f"hertz_{name}"] = variable("hertz_point", closed, unit)
+        closed = np.array([0.0, *(h.approach for h in hertz)])
+        out["hertz_approach"] = variable("hertz_point", closed, "mm")
     return out
 
 
-def _along(solution: ContactSolution) -> Variables:
-    """Contact area and largest pressure at the loaded points."""
-    points, dims = solution.curve, "loaded_point"
-    return {
-        "load": variable(dims, [p.force for p in points], "N"),
-        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
-        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
-    }
-
-
 # -- of flat faces ---------------------------------------------------------------------------------
-
-
-def _limit(solution: ContactSolution, path: LoadPath) -> Variables:
-    """Load of gross slip, and the printed stiffness."""
-    limit = solution.plan.scene.contact.friction * (path.case.load or 0.0)
-    name = f"K_T{path.case.direction}"
-    return {
-        "friction_limit": variable("", limit, "N"),
-        **_printed(solution, name, "_initial_raw", path.case),
-    }
-
-
-def _printed(solution: ContactSolution, name: str, total: str, case: Case) -> Variables:
-    """The printed stiffness of the whole contact, where one is; one printed of a pad goes with all
-    of them.
-    """
-    look_up = printed_of(solution.plan.scene)
-    whole, pad = (look_up(name + suffix, case.given()) for suffix in (total, "_per_pad"))
-    if whole:
-        return {"printed_stiffness": variable("", whole[0].value, "N/mm", source=whole[0].source)}
-    if pad:
-        n = len(lattices(solution))
-        source = f"{pad[0].source}, {n} pads"
-        return {"printed_stiffness": variable("", n * pad[0].value, "N/mm", source=source)}
-    return {}
 
 
 def _laws(solution: ContactSolution) -> dict[str, Group]:
@@ -253,10 +194,10 @@ def _laws(solution: ContactSolution) -> dict[str, Group]:
     scene = solution.plan.scene
     out: dict[str, Group] = {}
     for case in solution.normal if scene.wants("contact_law") else ():
-        law = faces.contact_law(solution, case)
+        law = contact_law(solution, case)
         if law is not None:
             placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
-            at = law.position[:, :2] - corner(solution)
+            at = law.position[:, :2] - solution.corner
             places = {
                 f"report_{axis}": variable("contact_point", at[:, k], "mm")
                 for k, axis in enumerate("xy")

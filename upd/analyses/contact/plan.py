@@ -1,26 +1,30 @@
-"""What a plan of a contact of two bodies holds: normal loads, mirror planes and load families,
-effects simulated and omitted, what the recipe is given, and what its meshes must name.
+"""Plan of a contact of two bodies, curved or flat: normal loads, mirror planes and load families,
+effects simulated and omitted, what the recipe is given and its meshes must name, size and cost.
+
+With it the coarser whole model on which numbers are solved again with effects left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES
+from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s, memory_limit
 from upd.contact.rigid_damper import FaceForces, equilibrium
-from upd.errors import InputError, OwnMeshError
+from upd.errors import InputError, OwnMeshError, UpdError
+from upd.linalg.select import EACH, FIRST
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
-from upd.mesh.recipe_modules import is_mesh
 from upd.reference import contact_modulus, dundurs_beta, hertz_sphere, sphere_gap
 from upd.results import Case
 from upd.scene import FRICTION_WANTS, Scene, friction_on
+from upd.vary.solve import changed
+from upd.vary.variation import ALONE
 
 Array = NDArray[np.float64]
 
@@ -33,12 +37,10 @@ TILT, DIRECTIONS, COUPLING = (
     "slip in two directions",
     "normal-tangential coupling",
 )
-#: why coupled contact slips in two directions
-_TOGETHER = "pressure and shear are solved at once"
 #: What to do about an effect that changes a number too much.
 REMEDIES = {
-    TILT: 'set contact.tilt = "free" (with a contact.load_point inside the contact), or choose '
-    "another contact.distant set",
+    TILT: 'set contact.tilt = "free"; where the load line runs beside the contact, the damper '
+    "then tips over: give a contact.load_point inside it, or choose another contact.distant set",
     DIRECTIONS: "set contact.directions = 2",
     COUPLING: 'set contact.coupling = "coupled", or trust the number to this change only',
 }
@@ -159,6 +161,7 @@ def choose_symmetry(scene: Scene) -> tuple[str, str]:
         "slip in two directions is solved on the full model": two and not scene.coupled,
         "the damper may tilt about both axes": scene.contact.tilt == "free",
         "the pads have unequal heights": scene.geometry.get("pad_offset", 0.0) != 0.0,
+        "a damper's face has one mirror plane": asked == "quarter" and not is_curved(scene),
     }
     reasons = "; ".join(why for why, applies in hindered.items() if applies)
     if asked not in ("auto", "full") and reasons:
@@ -192,13 +195,7 @@ def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
 
 # -- effects ---------------------------------------------------------------------------------------
 
-
-def _switched(name: str, on: bool, why: str, switch: str, shows: bool) -> Effect:
-    """An effect that a key of the scene switches on; left out, its check ``shows`` something, or it
-    does not apply.
-    """
-    check = name if shows and not on else ""
-    return Effect(name, on, why, check, () if on else (switch,), on or shows)
+_FROZEN = "normal forces stay frozen under shear: exact for half-spaces of like materials alone"
 
 
 def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[Effect, ...]:
@@ -209,72 +206,44 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
     why
         Of the symmetry.
     loaded
-        Whether any normal load presses the bodies.
+        Whether any normal load presses the bodies: an effect left out then changes a number.
     """
-    either, inside = Effect.either, ", ".join(_inside(scene))
-    if is_curved(scene):
-        tilts = []
-        gap = "the gap is curved: the contact set depends on the load"
-        small = "the contact is small against the body"
-    else:
-        free = scene.contact.tilt == "free"
+    contact, either, two = scene.contact, Effect.either, scene.slip_directions == 2
+    inside = ", ".join(_inside(scene))
+
+    def switched(name: str, on: bool, why: str, switch: str) -> Effect:
+        """An effect that a key of the scene switches on."""
+        check = name if loaded and not on else ""
+        return Effect(name, on, why, check, () if on else (switch,), on or loaded)
+
+    effects = [Effect("unilateral contact", True, "the contact set depends on the load")]
+    if not is_curved(scene):
+        free = contact.tilt == "free"
         tilt = "no moment about the load line" if free else "its distant set only translates"
-        tilts = [_switched(TILT, free, tilt, "contact.tilt=free", loaded)]
-        gap = "edges may lift off; one linear solve when none does"
-        small = "the approach is small against the patch"
-    displaced = f"a back-substitution per load for {inside}"
-    return (
-        Effect("unilateral contact", True, gap),
-        *tilts,
-        *_friction_effects(scene, loaded),
-        either("mirror symmetry", symmetry != "full", why, why),
-        either(
-            "internal displacement",
-            bool(inside),
-            displaced,
-            "no output asks for it: contact nodes only",
-        ),
-        either("inertia", False, "", "every output is static: M is not assembled"),
-        either("large displacement", False, "", small),
-    )
-
-
-def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
-    curved, mu = is_curved(scene), scene.contact.friction
-    coupling = _coupling_effect(scene, loaded)
-    if not friction_on(scene):
+        effects.append(switched(TILT, free, tilt, "contact.tilt=free"))
+    if friction_on(scene):
+        outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
+        slip = "asked for, or with the coupling" if two else "each load has one direction"
+        effects += [
+            Effect("friction", True, f"mu = {contact.friction:g} and the outputs {outputs}"),
+            switched(DIRECTIONS, two, slip, "contact.directions=2"),
+        ]
+    else:
         asked = scene.wants(*FRICTION_WANTS)
-        why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
-        return [Effect.either("friction", False, "", why), *[coupling] * (mu > 0.0)]
-    outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
-    two, why = scene.slip_directions == 2, _TOGETHER if scene.coupled else "asked for"
-    if not two:
-        why = "the load has one direction" if curved else "loads run along the axes"
-    # a number of a curved contact that depends on the directions of slip
-    depends = (
-        (scene.wants("stiffness") and scene.sphere_radius is not None)
-        or (scene.wants("tangential") and len(scene.loads.tangential) > 0)
-        or scene.wants("cycle")
+        none = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
+        effects.append(either("friction", False, "", none))
+    if contact.friction > 0.0:
+        how = "asked for" if scene.coupled else _FROZEN
+        effects.append(switched(COUPLING, scene.coupled, how, "contact.coupling=coupled"))
+    displaced = f"a back-substitution per load for {inside}"
+    unasked = "no output asks for it: contact nodes only"
+    return (
+        *effects,
+        either("mirror symmetry", symmetry != "full", why, why),
+        either("internal displacement", bool(inside), displaced, unasked),
+        either("inertia", False, "", "every output is static: M is not assembled"),
+        either("large displacement", False, "", "the approach is small against the bodies"),
     )
-    shows = loaded and (not curved or depends)
-    return [
-        Effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
-        _switched(DIRECTIONS, two, why, "contact.directions=2", shows),
-        coupling,
-    ]
-
-
-def _coupling_effect(scene: Scene, loaded: bool) -> Effect:
-    """Normal-tangential coupling; unlike materials are coupled by their pressure alone."""
-    beta, limit, coupled = beta_of(scene), scene.contact.coupling_limit, scene.coupled
-    frozen = "normal forces stay frozen under shear: exact for half-spaces of like materials alone"
-    if scene.contact.friction > 0.0 and beta > limit:
-        frozen += (
-            f"; |beta| = {beta:.3g} is above contact.coupling_limit = {limit:.3g}: set "
-            "contact.coupling = coupled"
-        )
-    how = "asked for" if coupled else frozen
-    return _switched(COUPLING, coupled, how, "contact.coupling=coupled", loaded)
 
 
 def _inside(scene: Scene) -> list[str]:
@@ -320,8 +289,8 @@ def hertz_radius(scene: Scene, load: float) -> float:
     """Hertz's radius in mm of a sphere under the load in N."""
     if scene.sphere_radius is None:
         raise InputError(
-            'geometry: "auto" sizes are known for a sphere on a plane only; recipe '
-            f"{scene.recipe!r} needs lengths"
+            'geometry: "auto", and an accuracy, size the mesh of a sphere on a plane only; recipe '
+            f"{scene.recipe!r} needs lengths and divisions"
         )
     m1, m2 = list(scene.materials.values())[:2]
     E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
@@ -348,20 +317,10 @@ def auto_patch(scene: Scene) -> float:
     load = max(scene.loads.forces)
     if not load > 0.0:
         raise InputError(
-            'geometry.patch: "auto" needs a positive normal load to size the patch; give '
-            "the patch a length"
+            'geometry.patch: "auto", or an accuracy, needs a positive normal load to size the '
+            "patch; give the patch a length"
         )
     return 2.6 * hertz_radius(scene, load)
-
-
-def wider_patch(scene: Scene, needed: float) -> str:
-    """What to do where a contact needs a patch of so many mm."""
-    if recipes.has_parameter(scene.recipe, "patch"):
-        return f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
-    return (
-        f"mesh a contact surface of {needed:.3g} mm or more, with all its nodes in the sets "
-        "'contact', or lower the load"
-    )
 
 
 def refined_growth(growth: float, ratio: float) -> float:
@@ -420,15 +379,11 @@ def _patch_problem(scene: Scene, mesh: Mesh) -> str:
     """What is wrong with the node sets contact_..., which are patches of their own, or ""."""
     patches = [name for name in mesh.nodes if name.startswith("contact_")]
     if is_curved(scene) and len(patches) > 1:
-        flat = (
-            "bring the contact nodes of both bodies into one plane, which makes the contact of a "
-            "mesh file flat"
-            if is_mesh(scene.recipe)
-            else 'write ANALYSIS = "flat contact" into the recipe'
-        )
         return (
             f"the node sets {', '.join(patches)} are {len(patches)} patches, a curved contact has "
-            f"one; to fix it: {flat} when the faces are flat, or name the set 'contact' alone"
+            'one; to fix it: write ANALYSIS = "flat contact" into the recipe, or bring the contact '
+            "nodes of a mesh file into one plane, when the faces are flat; or name the set "
+            "'contact' alone"
         )
     named = np.concatenate([mesh.nodes[name] for name in patches]) if patches else np.zeros(0, int)
     if patches and not np.array_equal(np.sort(named), np.sort(mesh.nodes["contact"])):
@@ -441,3 +396,230 @@ def _patch_problem(scene: Scene, mesh: Mesh) -> str:
             "contact node to one patch"
         )
     return ""
+
+
+# -- the plan, its size and cost -------------------------------------------------------------------
+
+
+def make_plan(scene: Scene) -> ContactPlan:
+    """Derive the plan of ``scene``, without the cost of what its errors are estimated with.
+
+    Raises InputError when its parts do not fit together.
+    """
+    if len(scene.materials) != 2:
+        raise InputError(
+            f"materials: a contact has two bodies, {len(scene.materials)} given "
+            f"({', '.join(scene.materials)})"
+        )
+    loaded = any(load > 0.0 for load in normal_loads(scene))
+    if not is_curved(scene):
+        _require_fitting(scene)
+    symmetry, why = choose_symmetry(scene)
+    families = make_families(scene, symmetry)
+    effects = make_effects(scene, symmetry, why, loaded)
+    parameters = recipe_parameters(scene, symmetry)
+    return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
+
+
+def _require_fitting(scene: Scene) -> None:
+    """Raise InputError for what a flat contact does not take."""
+    problems = []
+    axes = {component(d) for d in scene.loads.directions}
+    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
+        problems.append(
+            'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
+        )
+    oblique = [d for d in scene.loads.directions if component(d) is None]
+    if oblique and friction_on(scene) and scene.slip_directions == 1:
+        problems.append(
+            f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
+            "directions: set contact.directions = 2"
+        )
+    if problems:
+        raise InputError("\n".join(problems))
+
+
+def contact_plan(
+    scene: Scene,
+    symmetry: str,
+    families: tuple[Family, ...],
+    effects: Sequence[Effect],
+    parameters: Mapping[str, Any],
+) -> ContactPlan:
+    """The plan of a contact of two bodies, with its size and cost.
+
+    Raises InputError when a body lacks its material.
+    """
+    cost = CostModel(scene, recipes.count(scene.recipe, parameters))
+    on = {effect.name for effect in effects if effect.on}
+    missing = sorted(set(cost.size) - set(scene.materials))
+    spare = sorted(set(scene.materials) - set(cost.size))
+    if missing or spare:
+        raise InputError(
+            f"materials: the recipe makes the bodies {', '.join(cost.size)}"
+            + (f"; {', '.join(missing)} has no material" if missing else "")
+            + (f"; {', '.join(spare)} is not one of them" if spare else "")
+        )
+    require_held(scene, parameters, cost.size)
+    if recipes.counted_by_mesh(scene.recipe):
+        # The mesh is there: what it lacks is reported before anything is written.
+        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
+    _add_bodies(cost, families, recipes.weighted_sets(scene.recipe, parameters))
+    _add_loads(cost, scene, on)
+    # The internal displacement takes the factors of all bodies again.
+    needs = cost.in_a_row(keep="internal displacement" in on)
+    # A table row, a group of arrays and a curve per load.
+    loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
+    files = _FILES_S + 5e-3 * loads + _NODE_S * cost.nodes * scene.wants("fields")
+    return ContactPlan.of(cost, symmetry, parameters, effects, needs, files, families=families)
+
+
+def _add_bodies(
+    cost: CostModel, families: Sequence[Family], weighted: Mapping[str, Sequence[str]]
+) -> None:
+    """Bodies meshed and condensed, or learned from products.
+
+    Parameters
+    ----------
+    weighted
+        Body -> its sets with weights, which hold it in the mean.
+    """
+    scene: Any = cost.scene
+    for count in cost.size.values():
+        cost.contact_body(count)
+    # what every task keeps is held at once: an equal share of the memory each
+    room = (memory_limit(scene) - cost.kept_bytes) / (len(cost.size) * len(families))
+    for body, count in cost.size.items():
+        chosen = scene.contact.distant.get(body)
+        in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
+        for family in families:
+            task, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
+            if is_curved(scene) and not scene.coupled and not in_mean:
+                cost.contact(task, count, n_kept, _products(scene, family), room)
+            else:
+                cost.condensed(task, count, n_kept)
+            if in_mean:
+                cost.held_in_mean(task, count)
+
+
+# A cycle takes the products of so many loads.
+_CYCLE_CASES = 4
+
+
+def _products(scene: Scene, family: Family) -> int:
+    """Products that a family of loads takes about."""
+    loads, cases = len(scene.loads.normal), 0
+    if NORMAL in family.components:
+        cases += loads * (3 if scene.wants("stiffness") else 1)
+        cases += scene.loads.curve_points * scene.wants("curve")
+    if ALONG in family.components:
+        sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
+        cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
+    return FIRST + EACH * max(cases - 1, 0)
+
+
+# Counted and timed on the ready scenes, one thread: a contact set under one load; a tangential
+# load; a step of the march along one direction and, with its disks, along two; coupled, a step; a
+# displacement inside both bodies, per node.
+_LOAD_S, _TANGENTIAL_S, _STEP_S, _COUPLED_S = 1e-3, 5e-3, {1: 1.5e-4, 2: 1.5e-3}, 5e-3
+_INSIDE_S = 1.4e-6
+# Figures and page, files of fields per node.
+_FILES_S, _NODE_S = 3.0, 3.5e-5
+# Of coupled contact: flops of a load step over the cube of its closed dofs, and over those times
+# all; dense matrices of all dofs kept (compliance, factor, inverse, what solves them); steps of the
+# curve to gross slip.
+_STEP_CUBES, _STEP_SQUARES, _KEPT, _CURVE_STEPS = 1.5, 20.0, 5.0, 26
+
+
+def _add_loads(cost: CostModel, scene: Scene, on: Collection[str]) -> None:
+    """Seconds and bytes of all loads, with the effects ``on``."""
+    nodes, k = cost.nodes, max(count["contact"] for count in cost.size.values())
+    curved, n_load = is_curved(scene), len(scene.loads.normal)
+    n_curve = scene.loads.curve_points * scene.wants("curve")
+    # A stiffness is a slope between two more loads.
+    forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
+    lines = n_load * len(scene.loads.directions) * ("friction" in on)
+    ratios = lines * len(scene.loads.tangential) * scene.wants("tangential")
+    steps = lines * scene.loads.cycle_steps * scene.wants("cycle")
+    # A curved contact's patch reaches to twice its radius at least.
+    share = np.pi / 16.0 if curved else 1.0
+    cost.seconds += forces * (_LOAD_S + dense_s(k**3 / 6.0))
+    cost.seconds += steps * _STEP_S[scene.slip_directions]
+    cost.seconds += ratios * (_TANGENTIAL_S + dense_s(3.0 * k**3))
+    # Four numbers a step and node: traction, also before it is clipped, slip, state.
+    cost.kept_bytes += 32.0 * steps * scene.slip_directions * share * k
+    cost.kept_bytes += 64.0 * (forces + ratios) * k
+    if scene.coupled:
+        m, closed = 3.0 * k, 3.0 * share * k
+        # Faces that touch without a load scale: their normal loads are one step.
+        coupled = 8.0 + 3.0 * forces if curved else 1.0
+        coupled += lines * _CURVE_STEPS * scene.wants("tangential") + 1.8 * steps
+        one = _STEP_CUBES * closed**3 + _STEP_SQUARES * m * closed
+        cost.seconds += coupled * (_COUPLED_S + dense_s(one)) + dense_s(m**3 / 3.0)
+        cost.kept_bytes += _KEPT * 8.0 * m**2
+    if "internal displacement" in on:
+        cost.seconds += n_load * (1 + ("friction" in on)) * nodes * _INSIDE_S
+        cost.kept_bytes += 48.0 * n_load * nodes
+
+
+# -- the coarser whole model -----------------------------------------------------------------------
+
+#: parameters of a recipe that are numbers of elements
+_DIVISIONS = ("divisions", "divisions_long")
+
+
+def _with_companion(plan: ContactPlan) -> ContactPlan:
+    """The plan with a companion where an effect left out needs one, and its cost.
+
+    The companion has half the elements along each edge of its contact, where the recipe can be made
+    coarser.
+    """
+    if not plan.shown:
+        return plan
+    effects = [replace(e, on=e.on and e.name != "internal displacement") for e in plan.effects]
+    # It is sheared as far as the run is, and goes through a cycle only where nothing else is.
+    ratio = largest_ratio(plan.scene)
+    want = [w for w in ("stiffness", "tangential") if plan.scene.wants(w)]
+    if plan.scene.wants("cycle") and "stiffness" not in want and not ratio > 0.0:
+        want.append("cycle")
+    looked_at = ("want", tuple(want)), ("loads.tangential", (ratio,))
+    # What couples the directions is looked up in the whole compliance.
+    scene = changed(plan.scene, (*looked_at, ("solver.route", "condensed"), *ALONE))
+    whole, family = _whole_parameters(scene), (Family(COMPONENTS),)
+    try:
+        companion = contact_plan(scene, "full", family, effects, whole | _coarse(scene, whole))
+    except UpdError:
+        # A recipe of the user's own that cannot be coarser.
+        companion = contact_plan(scene, "full", family, effects, whole)
+    return replace(
+        plan,
+        companion=companion,
+        seconds=plan.seconds + companion.solve_seconds,
+        # Both models are there at the same time, the libraries once.
+        memory_bytes=plan.memory_bytes + companion.memory_bytes - START_BYTES,
+    )
+
+
+def _coarse(scene: Scene, whole: Mapping[str, Any]) -> dict[str, int]:
+    """Half the elements along each edge of the contact, not fewer than it takes."""
+    fewest = 8 if NODES[scene.mesh.element] == 8 else 4
+    counts = {name: whole.get(name) for name in _DIVISIONS}
+    return {
+        name: max(fewest, 2 * (n // 4))
+        for name, n in counts.items()
+        if isinstance(n, int) and n > fewest
+    }
+
+
+def _whole_parameters(scene: Scene) -> dict[str, Any]:
+    """Of the whole model at the run's spacing; the patch no larger than the largest load needs."""
+    parameters = recipe_parameters(scene, "full")
+    if scene.sphere_radius is None or not max(scene.loads.forces) > 0.0:
+        return parameters
+    patch, needed = float(parameters["patch"]), auto_patch(scene)
+    if needed < patch:
+        divisions = 2 * round(0.5 * needed / patch * int(parameters["divisions"])) or 2
+        parameters |= {"patch": needed, "divisions": divisions}
+        if scene.geometry.get("core_depth", "auto") == "auto":
+            parameters["core_depth"] = auto_core_depth(scene, needed)
+    return parameters

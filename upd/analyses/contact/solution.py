@@ -1,25 +1,39 @@
-"""What a run of a contact finds: its normal loads, its tangential loads, all of it.
+"""What a run of a contact finds: its normal loads, its tangential loads, all of it; and loads after
+loads of two condensed bodies, with normal and tangential contact at once.
 
 Fields are those of the model's contact nodes, (n,); mirror symmetry may make the model a part of
-the whole, which loads and stiffnesses are those of. `faces` has the fields on the whole contact.
-It knows what Hertz, Cattaneo and Mindlin have for the loads of a sphere on a plane.
+the whole, which loads and stiffnesses are those of. It knows what Hertz, Cattaneo and Mindlin have
+for the loads of a sphere on a plane.
+
+The normal load rises without a tangential one; the tangential loads follow it. Friction remembers
+its way: every state of coupled contact starts from the one before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
-from upd.analyses.contact.loading import CoupledState, LoadPath, Sheared
-from upd.analyses.contact.plan import ContactPlan, direction_name, is_curved
+from upd.analyses.contact.plan import (
+    ACROSS,
+    ALONG,
+    COMPONENTS,
+    NORMAL,
+    ContactPlan,
+    direction_name,
+    is_curved,
+)
 from upd.contact.bulk import BodyShare
-from upd.contact.model import ContactModel
+from upd.contact.coulomb_conditions import STICK
+from upd.contact.coupled import CoupledContact, coupled_contact
+from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.patch import ContactMeasures
+from upd.contact.patch import ContactMeasures, LocatedArea, Patch, located_area, measure
+from upd.errors import ConvergenceError
 from upd.reference import (
     HertzPoint,
     contact_modulus,
@@ -32,46 +46,137 @@ from upd.results import Case, Estimates
 from upd.results import quantities as q
 
 Array = NDArray[np.float64]
+#: Relative step of load on both sides of a load over which a slope of the force-approach curve is
+#: taken; the curvature of Hertz's F ~ d^(3/2) makes it 0.074 LOAD_STEP^2 too soft.
+LOAD_STEP = 0.1
+#: Steps in which a normal load rises from nothing, at least.
+NORMAL_STEPS = 8
 #: name of a number -> its closed form in mm, N, and the source
 References = dict[str, tuple[float | None, str]]
 _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
 
 
-@dataclass
-class PressedContact:
-    """Answer of both bodies under a normal load, or of one pressed by a rigid counterpart.
+@dataclass(frozen=True)
+class LoadPath:
+    """Tangential force over displacement after one normal load, of the whole contact.
 
     Attributes
     ----------
-    stiffness
-        Tangent normal stiffness of the whole contact, N/mm.
-    state
-        With normal and tangential contact at once, the state it comes from.
-    tilt
-        (2,) free tilts in rad; None where they are held.
+    case
+        Of the normal load, with the direction.
+    load, displacement
+        (n_step,) N and mm along the load, from zero on.
+    cycle
+        First loading to +T*, then the closed loop +T* -> -T* -> +T*; otherwise first loading only.
+    slip_work, loop_area
+        N mm over the closed loop.
+    most_work
+        Slip work of the loop that has most, N mm: of coupled contact it may fade from loop to loop
+        (shakedown).
     """
 
-    solution: NormalContact
-    stiffness: float
-    state: CoupledState | None = None
-    tilt: Array | None = None
+    case: Case
+    load: Array
+    displacement: Array
+    cycle: bool = False
+    slip_work: float = 0.0
+    loop_area: float = 0.0
+    most_work: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sheared:
+    """What a tangential load step left at the n loaded nodes, unprocessed: for checks.
+
+    Vectors are (n,), or (2 n,) with x dofs first.
+
+    Attributes
+    ----------
+    components
+        Of the load, one per n entries of a vector.
+    loaded
+        (n,) contact nodes that carry a normal force.
+    limit
+        (n,) mu times the normal force, N.
+    force
+        Tractions in N, before they were brought inside their limits.
+    before
+        Slip before the step, mm.
+    displacement, load
+        (1 or 2,) mm, and N on the model.
+    stick
+        (n,) which nodes stick.
+    terms
+        Size of what ``before`` was summed from where that is more than a slip, mm.
+    """
+
+    components: tuple[int, ...]
+    loaded: NDArray[np.int64]
+    limit: Array
+    force: Array
+    before: Array
+    displacement: Array
+    load: Array
+    stick: NDArray[np.bool_]
+    terms: Array | float = 0.0
+
+
+@dataclass(frozen=True)
+class CoupledState:
+    """A load step of coupled contact.
+
+    Attributes
+    ----------
+    found
+        Answers up to it; its own is the last.
+    before
+        (n, 2) slip before the step, mm.
+    """
+
+    found: CoupledContact
+    before: Array
+
+    @property
+    def force(self) -> Array:
+        """(n, 3) normal force, force along x and y, N."""
+        return np.asarray(self.found.force[-1])
+
+    @property
+    def motion(self) -> Array:
+        """(r,) approach, shifts along x and y in mm, free tilts in rad."""
+        return np.asarray(self.found.displacement[-1])
 
     @property
     def stick(self) -> NDArray[np.bool_]:
-        """(n,) nodes that stick without a tangential load: all in contact, if pressure does not
-        shear.
-        """
-        return self.solution.contact if self.state is None else self.state.stick
+        """(n,) nodes that stick."""
+        return np.asarray(self.found.state[-1] == STICK)
+
+    @property
+    def shear_stiffness(self) -> Array:
+        """(2, 2) dT/dd in N/mm with the normal load and the states kept; 0 where nothing holds."""
+        try:
+            return np.asarray(np.linalg.inv(np.linalg.inv(self.found.stiffness())[1:3, 1:3]))
+        except (ConvergenceError, np.linalg.LinAlgError):
+            return np.zeros((2, 2))
 
 
-@dataclass(kw_only=True)
-class NormalCase(PressedContact):
-    """One normal load on the whole contact.
+@dataclass
+class NormalCase:
+    """One normal load on the whole contact, of both bodies or of one pressed by a rigid
+    counterpart.
 
     Attributes
     ----------
     force
         N on the whole contact.
+    stiffness
+        Tangent normal stiffness of the whole contact, N/mm.
+    measures
+        Size and pressure of the contact.
+    state
+        With normal and tangential contact at once, the state it comes from.
+    tilt
+        (2,) free tilts in rad; None where they are held.
     alone
         By body: its answer at the same load, pressed by a rigid counterpart, where a stiffness
         calls for it.
@@ -89,8 +194,12 @@ class NormalCase(PressedContact):
     """
 
     force: float
+    solution: NormalContact
+    stiffness: float
     measures: ContactMeasures
-    alone: dict[str, PressedContact] = field(default_factory=dict)
+    state: CoupledState | None = None
+    tilt: Array | None = None
+    alone: dict[str, NormalCase] = field(default_factory=dict)
     stuck: dict[float, tuple[float, dict[str, float]]] = field(default_factory=dict)
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
@@ -102,6 +211,13 @@ class NormalCase(PressedContact):
     def case(self) -> Case:
         """The load, with as many digits as distinguish the scene's loads."""
         return Case(load=self.force)
+
+    @property
+    def stick(self) -> NDArray[np.bool_]:
+        """(n,) nodes that stick without a tangential load: all in contact, if pressure does not
+        shear.
+        """
+        return self.solution.contact if self.state is None else self.state.stick
 
     @property
     def approach(self) -> float:
@@ -158,7 +274,7 @@ class ContactSolution:
     Attributes
     ----------
     curve
-        Loaded points of the force-approach curve.
+        Loaded points of the force-approach curve, N and mm.
     paths
         Tangential force over displacement, cycles among them.
     no_shares
@@ -172,7 +288,7 @@ class ContactSolution:
     plan: ContactPlan
     model: ContactModel
     normal: list[NormalCase] = field(default_factory=list)
-    curve: list[NormalCase] = field(default_factory=list)
+    curve: list[tuple[float, float]] = field(default_factory=list)
     tangential: list[TangentialCase] = field(default_factory=list)
     paths: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
@@ -196,6 +312,43 @@ class ContactSolution:
         """A normal load with a tangential one; a curved contact has one direction."""
         name = "" if self.curved else direction_name(direction)
         return replace(normal.case, direction=name, ratio=ratio)
+
+    @property
+    def lattices(self) -> dict[str, Patch]:
+        """The patches of the whole contact by name, from left to right, mirror images included."""
+        found = dict(self.model.patches)
+        if 0 in self.plan.mirrors:
+            found |= {
+                {"right": "left"}.get(name, f"{name} mirrored"): patch.image()
+                for name, patch in self.model.patches.items()
+                if not patch.mirrored[0]
+            }
+        return dict(sorted(found.items(), key=lambda item: float(item[1].X.min())))
+
+    @property
+    def corner(self) -> Array:
+        """(2,) origin of the axes that fields are reported in, contact axes in mm: of a curved
+        contact the same, of flat faces the bottom left corner of all patches together, x along the
+        damper, y up the slope, as in the source thesis.
+        """
+        if self.curved:
+            return np.zeros(2)
+        found = self.lattices.values()
+        return np.array([min(k.X.min() for k in found), min(k.Y.min() for k in found)])
+
+    def area_of(self, nodes: NDArray[np.bool_]) -> float:
+        """Tributary area of nodes (n,) on the whole contact, mm2."""
+        return sum(float(k.area()[k.whole(nodes) > 0.0].sum()) for k in self.lattices.values())
+
+    def tractions(self, t: TangentialCase) -> list[Array]:
+        """(n,) traction at the nodes in MPa, direction by direction."""
+        loaded = t.pressed > 0.0
+        return [self.model.multipliers.pressure(force, loaded) for force in t.force.T]
+
+    def rim_nodes(self, case: NormalCase) -> int:
+        """How many nodes of the rim of a curved contact's patch carry force."""
+        patch = self.model.patch
+        return int((patch.whole(case.solution.force).ravel()[patch.rim()] > 0.0).sum())
 
     # -- closed forms of a sphere on a plane -----------------------------------------------------
 
@@ -276,3 +429,232 @@ class ContactSolution:
         moved = float(mindlin.displacement(t.load, mu, t.normal.force, hertz.radius, C))
         values = {q.STICK_RADIUS: c, q.SHEAR_RAW: moved, q.SHEAR: moved}
         return {one.name: (value, _MINDLIN) for one, value in values.items()}
+
+
+def measured(solution: ContactSolution, answer: NormalContact, load: float) -> ContactMeasures:
+    """Size and pressure of the whole contact under one normal load in N; flat faces have no radius.
+
+    The edge is located between the nodes, but of a sphere, whose area is that of Hertz's pressure.
+    """
+    faces = list(solution.lattices.values())
+    forces = [k.whole(answer.force, extensive=True) for k in faces]
+    pressure = solution.model.multipliers.pressure(answer.force)
+    located = None
+    if solution.plan.scene.sphere_radius is None:
+        found = [
+            located_area(
+                k.points(),
+                k.cells(),
+                (f / k.area()).ravel(),
+                k.whole(answer.gap).ravel(),
+                (f > 0.0).ravel(),
+                solution.modulus,
+            )
+            for k, f in zip(faces, forces, strict=True)
+        ]
+        located = LocatedArea(sum(a.area for a in found), sum(a.resolution for a in found))
+    if solution.curved:
+        return measure(solution.model.patch, forces[0], located, faces[0].whole(pressure))
+    assert located is not None
+    none = float("nan")
+    return ContactMeasures(
+        none,
+        none,
+        none,
+        located.area,
+        sum(float(k.area()[f > 0.0].sum()) for k, f in zip(faces, forces, strict=True)),
+        float(pressure.max()),
+        load / located.area if located.area else 0.0,
+        located.resolution,
+    )
+
+
+# -- loads after loads -----------------------------------------------------------------------------
+
+
+def contact_points_of(model: ContactModel) -> Array:
+    """(n, 3) the contact nodes that carry forces, in contact axes, mm."""
+    points: Array = model.lower.mesh.points[model.lower.contact[model.multipliers.nodes]]
+    return points
+
+
+def load_point(plan: ContactPlan, model: ContactModel) -> Array:
+    """(2,) where the load line meets the contact plane, contact axes in mm."""
+    upper = model.upper
+    if plan.scene.contact.load_point is not None:
+        low: Array = contact_points_of(model)[:, :2].min(axis=0)
+        return np.asarray(low + np.array(plan.scene.contact.load_point))
+    nodes = upper.mesh.points[upper.mesh.nodes["distant"], :2]
+    weights = upper.mesh.weights.get("distant")
+    # Middle of the set's extent: its nodes need not be evenly spread. Weights say where it is.
+    middle = (
+        0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
+        if weights is None
+        else np.asarray(weights @ nodes / weights.sum())
+    )
+    return np.asarray(middle if 0 not in plan.mirrors else middle * np.array([0.0, 1.0]))
+
+
+def tilt_arms(plan: ContactPlan, model: ContactModel) -> Array:
+    """(n, k) mm from the load line to the nodes, for the k free tilts."""
+    if plan.scene.contact.tilt != "free":
+        return np.zeros((len(model.gap), 0))
+    return contact_points_of(model)[:, :2] - load_point(plan, model)
+
+
+def tangential_compliance(
+    model: ContactModel,
+    components: Sequence[int],
+    loaded: NDArray[np.int64],
+    body: Body | None = None,
+) -> Array:
+    """Compliance of the loaded nodes, (n, n) or (2n, 2n) mm/N with x dofs first, of both bodies or
+    of one.
+    """
+    pick = np.ix_(loaded, loaded)
+    rows = [[model.compliance(i, j, body)[pick] for j in components] for i in components]
+    return np.block(rows)
+
+
+def cycle_shares(steps: int, loops: int) -> tuple[Array, int, int]:
+    """Loads of a cycle over its peak, the first loading and so many loops, and how many of them are
+    before the loops and in each.
+    """
+    quarter = max(2, steps // 5)
+    half = (steps - quarter) // 2
+    back, forth = np.linspace(1.0, -1.0, half + 1)[1:], np.linspace(-1.0, 1.0, half + 1)[1:]
+    first = np.linspace(0.0, 1.0, quarter + 1)[1:]
+    return np.concatenate([first, *(back, forth) * loops]), quarter, 2 * half
+
+
+def raised(
+    model: ContactModel,
+    friction: float,
+    loads: Iterable[float],
+    arms: Array,
+    *,
+    body: Body | None = None,
+) -> dict[float, CoupledState]:
+    """States of the positive normal loads in N, each on the way to the next, without a tangential
+    load.
+
+    Parameters
+    ----------
+    arms
+        (n, k) mm of the k free tilts.
+    body
+        Against a rigid counterpart; None: both.
+    """
+    n, out = len(model.gap), {}
+    found: CoupledContact | None = None
+    at = 0.0
+    for F in sorted({load for load in loads if load > 0.0}):
+        steps = int(np.ceil(NORMAL_STEPS * (1.0 - at / F)))
+        way = np.zeros((steps, 3 + arms.shape[1]))
+        way[:, 0] = np.linspace(at, F, steps + 1)[1:]
+        before = np.zeros((n, 2)) if found is None else found.slip[-1]
+        if found is None:
+            # approach, shifts along x and y, tilts
+            columns = np.zeros((3 * n, 3 + arms.shape[1]))
+            columns[:, :3], columns[:n, 3:] = np.kron(np.eye(3), np.ones((n, 1))), arms
+            found = coupled_contact(
+                tangential_compliance(model, COMPONENTS, np.arange(n), body),
+                model.gap,
+                friction,
+                load=way,
+                columns=columns,
+            )
+        else:
+            found = found.go_on(load=way)
+        out[F] = CoupledState(found, found.slip[-2] if steps > 1 else before)
+        at = F
+    return out
+
+
+def slope(states: dict[float, CoupledState], load: float) -> float:
+    """dF/d approach in N/mm while the normal load rises, tilts and shifts following."""
+    low, high = (states[load * (1.0 + s)] for s in (-LOAD_STEP, LOAD_STEP))
+    return 2.0 * LOAD_STEP * load / float(high.motion[0] - low.motion[0])
+
+
+def as_normal(state: CoupledState, stiffness: float) -> NormalContact:
+    """The normal part of a state."""
+    found, f = state.found, state.force[:, 0]
+    return NormalContact(
+        np.maximum(f, 0.0),
+        np.maximum(found.gap[-1], 0.0),
+        np.asarray(found.state[-1] > 0),
+        float(state.motion[0]),
+        stiffness,
+        int(found.iterations[-1]),
+        "fallback" if found.fallbacks else "active set",
+        found.status,
+        found.message,
+        f,
+    )
+
+
+def opened_by_shear(model: ContactModel, state: CoupledState) -> Array:
+    """(n,) mm that the tangential forces open, C_nt t."""
+    f = state.force
+    return np.asarray(
+        sum(
+            (model.compliance(NORMAL, c) @ f[:, 1 + k] for k, c in enumerate((ALONG, ACROSS))),
+            np.zeros(len(f)),
+        )
+    )
+
+
+def shear_nodes(model: ContactModel, friction: float, state: CoupledState) -> Sheared:
+    """What a step left at the closed nodes: beside the slip before it stands the way that the
+    pressure alone moves them, C_tn f.
+    """
+    on = np.flatnonzero(state.found.state[-1] > 0)
+    f, axes = state.force, (ALONG, ACROSS)
+    size = float(np.sqrt(np.diagonal(model.compliance(NORMAL))) @ np.abs(f[:, 0]))
+    before = [model.compliance(c, NORMAL) @ f[:, 0] + state.before[:, c] for c in axes]
+    return Sheared(
+        axes,
+        on,
+        friction * f[on, 0],
+        np.concatenate([f[on, 1], f[on, 2]]),
+        np.concatenate([one[on] for one in before]),
+        state.motion[1:3],
+        state.found.load[-1, 1:3],
+        state.stick[on],
+        np.concatenate([np.sqrt(np.diagonal(model.compliance(c)))[on] * size for c in axes]),
+    )
+
+
+def loads_along(base: CoupledState, values: Array, unit: Array) -> Array:
+    """The normal load of a state with tangential ones (k,) in N along ``unit`` (2,)."""
+    out = np.zeros((len(values), len(base.motion)))
+    out[:, 0] = base.found.load[-1, 0]
+    out[:, 1:3] = np.outer(values, unit)
+    return out
+
+
+def sheared(
+    base: CoupledState, values: Array, unit: Array, needed: float
+) -> tuple[list[CoupledState], Array]:
+    """Tangential loads (k,) in N along ``unit`` (2,), rising, from the state of a normal load.
+
+    Those above ``needed`` are there for a curve, which ends where the contact slides.
+
+    Returns
+    -------
+    states, displacement
+        After each load, and (k,) mm along the direction since the normal load.
+    """
+    now, states = base, []
+    for T in values:
+        try:
+            found = now.found.go_on(load=loads_along(base, np.array([T]), unit))
+        except ConvergenceError:
+            if needed >= T:
+                raise
+            break
+        now = CoupledState(found, now.found.slip[-1])
+        states.append(now)
+    start = base.motion[1:3]
+    return states, np.array([(one.motion[1:3] - start) @ unit for one in states])

@@ -17,24 +17,35 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.base import Resolved, keeping
-from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
-from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
-from upd.analyses.contact.faces import measured
+from upd.analyses.contact.bodies import learns, prepare, solve_inside
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import (
+    LOAD_STEP,
     ContactSolution,
+    CoupledState,
+    LoadPath,
     NormalCase,
-    PressedContact,
+    Sheared,
     TangentialCase,
+    as_normal,
+    cycle_shares,
+    loads_along,
+    measured,
+    raised,
+    shear_nodes,
+    sheared,
+    slope,
+    tangential_compliance,
+    tilt_arms,
 )
 from upd.contact import tangential_contact, tangential_path
 from upd.contact.checks import few_threads
 from upd.contact.model import Body, ContactModel
-from upd.contact.normal import normal_contact, normal_curve
+from upd.contact.normal import NormalContact, normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
-from upd.contact.tangential import TangentialContact, TangentialPath
+from upd.contact.tangential import TangentialPath
 from upd.contact.tilt import tilted_contact
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
@@ -50,10 +61,8 @@ Marched = tuple[Array, Array, Callable[[int, float], TangentialCase]]
 
 #: Shares of mu N of the force-displacement curve: even steps, then closer to gross slip.
 PATH_SHARES = np.concatenate(
-    [np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]]
+    [np.arange(1, 19) / 20.0, [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]]
 )
-# On the way to the tangential loads of a curved contact where the pressure follows the shear.
-_SHARES = np.arange(1, 20) / 20.0
 #: tangential load of an initial stiffness of coupled contact, as a part of mu N
 SMALL_SHEAR = 1e-3
 
@@ -88,19 +97,12 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     plan = solution.plan
     wanted = list(planned.normal_loads(plan.scene))
     curve = _curve_loads(plan, max(wanted), solution.curved)
-    steps = (-loading.LOAD_STEP, 0.0, loading.LOAD_STEP) if _by_slope(solution) else ()
+    steps = (-LOAD_STEP, 0.0, LOAD_STEP) if _by_slope(solution) else ()
     around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
-        solution.normal, solution.curve = (
-            [
-                NormalCase(
-                    **vars(found[F]), force=F, measures=measured(solution, found[F].solution, F)
-                )
-                for F in loads
-            ]
-            for loads in (wanted, curve)
-        )
+        solution.curve = [(F, found[F].solution.approach) for F in curve]
+        solution.normal = [found[F] for F in wanted]
         for body in _bodies_alone(solution):
             alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
@@ -123,15 +125,13 @@ def _curve_loads(plan: ContactPlan, largest: float, curved: bool) -> list[float]
     top = largest if loads.curve_to is None else loads.curve_to
     if not plan.scene.wants("curve") or not top > 0.0:
         return []
-    n = loads.curve_points
-    if curved:
-        return [top * s**1.5 for s in np.linspace(0.0, 1.0, n + 1)[1:]]
-    return [top * k / n for k in range(1, n + 1)]
+    shares = np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]
+    return [float(top * s) for s in (shares**1.5 if curved else shares)]
 
 
 def press(
     solution: ContactSolution, forces: Iterable[float], body: Body | None = None
-) -> dict[float, PressedContact]:
+) -> dict[float, NormalCase]:
     """Answers of the forces in N on the whole contact, by force.
 
     Parameters
@@ -146,56 +146,69 @@ def press(
     distinct = sorted(set(forces))
     if plan.scene.coupled:
         return _sheared_too(solution, distinct, body)
-    loads, arms = [F / plan.copies for F in distinct], loading.tilt_arms(plan, model)
-    if solution.curved:
-        show_normal(model, loads)
+    loads, arms = [F / plan.copies for F in distinct], tilt_arms(plan, model)
 
     def compliance() -> Array:
         return model.compliance(NORMAL, body=body)
 
     if arms.size:
-        found, free = [], (0 not in plan.mirrors, 1 not in plan.mirrors)
-        for F in loads:
-            t = tilted_contact(compliance(), model.gap, arms, load=F, free=free)
-            found.append(PressedContact(t.normal, plan.copies * t.free_stiffness, tilt=t.tilt))
+        free = (0 not in plan.mirrors, 1 not in plan.mirrors)
+        tilted = [tilted_contact(compliance(), model.gap, arms, load=F, free=free) for F in loads]
+        found: list[tuple[NormalContact, float, Array | None]] = [
+            (t.normal, t.free_stiffness, t.tilt) for t in tilted
+        ]
     else:
         answers = settled(
             model,
             (NORMAL,),
             lambda: normal_curve(compliance(), model.gap, loads),
-            lambda found: [(np.column_stack([one.force for one in found]), KNOWN)],
+            _known,
         )
-        found = [PressedContact(one, plan.copies * one.stiffness) for one in answers]
-    out = dict(zip(distinct, found, strict=True))
+        found = [(one, one.stiffness, None) for one in answers]
+    out = {
+        F: NormalCase(F, one, plan.copies * K, measured(solution, one, F), tilt=tilt)
+        for F, (one, K, tilt) in zip(distinct, found, strict=True)
+    }
     for F in distinct if _by_slope(solution) else ():
-        ends = [out.get(F * (1.0 + s)) for s in (-loading.LOAD_STEP, loading.LOAD_STEP)]
+        ends = [out.get(F * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP)]
         if F > 0.0 and ends[0] and ends[1]:
             moved = ends[1].solution.approach - ends[0].solution.approach
-            out[F].stiffness = 2.0 * loading.LOAD_STEP * F / moved
+            out[F].stiffness = 2.0 * LOAD_STEP * F / moved
     return out
+
+
+def _known(found: Sequence[NormalContact]) -> Iterator[tuple[Array, float]]:
+    """Forces and their rates, and the largest share of them that may be unknown."""
+    for one in found:
+        yield one.force, KNOWN
+        if one.rates is not None:
+            yield one.rates, KNOWN_STIFFNESS
 
 
 def _sheared_too(
     solution: ContactSolution, forces: Sequence[float], body: Body | None
-) -> dict[float, PressedContact]:
+) -> dict[float, NormalCase]:
     """The same with normal and tangential contact at once, the slope of the curve as the stiffness
     where it is known.
     """
     model, mu = solution.model, solution.plan.scene.contact.friction
-    arms = loading.tilt_arms(solution.plan, model)
-    states = loading.raised(model, mu, forces, arms, body=body)
+    arms = tilt_arms(solution.plan, model)
+    states = raised(model, mu, forces, arms, body=body)
     # no load: friction has nothing to hold
-    none = partial(normal_contact, model.compliance(NORMAL), model.gap, load=0.0)
-    out = {F: PressedContact(none(), 0.0) for F in forces if not F > 0.0}
+    out = {}
+    for F in (F for F in forces if not F > 0.0):
+        none = normal_contact(model.compliance(NORMAL), model.gap, load=0.0)
+        out[F] = NormalCase(F, none, 0.0, measured(solution, none, F))
     for F, state in states.items():
-        sloped = all(F * (1.0 + s) in states for s in (-loading.LOAD_STEP, loading.LOAD_STEP))
-        free = loading.slope(states, F) if sloped else float("nan")
+        sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
+        free = slope(states, F) if sloped else float("nan")
         held = free
         if arms.size and sloped and body is None:
             # dF/d approach with the tilts held and the states kept, shifts following
             held = float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
         tilt = state.motion[3:] if arms.size else None
-        out[F] = PressedContact(loading.as_normal(state, held), free, state, tilt)
+        answer = as_normal(state, held)
+        out[F] = NormalCase(F, answer, free, measured(solution, answer, F), state, tilt)
     return out
 
 
@@ -215,9 +228,6 @@ def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
 def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
     """Stiffness, tangential loads, curve and cycle of every direction after every normal load."""
     scene = solution.plan.scene
-    # The march to the loads: of flat faces to gross slip, for a curve.
-    below = _SHARES[planned.largest_ratio(scene) > _SHARES]
-    shares = below if solution.curved else PATH_SHARES
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
         loaded = [case for case in solution.normal if case.solution.force.any()]
         # Twice: what one load teaches changes the answers of the others within the tolerance.
@@ -226,29 +236,29 @@ def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
             Frozen(solution, case, 0.0).learn()
         for case in loaded:
             for direction in scene.loads.directions:
-                _sheared(solution, case, direction, shares)
+                _sheared(solution, case, direction)
 
 
-def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
-    """Stiffness, single loads, curve and cycle of one direction after one normal load."""
-    scene, own = solution.plan.scene, solution.sheared_case(case, direction)
+def _sheared(solution: ContactSolution, case: NormalCase, direction: float) -> None:
+    """Stiffness, loads on one way, cycle of one direction after one normal load."""
+    scene, curved = solution.plan.scene, solution.curved
     way = (Frozen if case.state is None else _Coupled)(solution, case, direction)
     # Flat faces share their law by the stuck contact.
-    if not solution.curved or scene.wants("stiffness"):
+    if not curved or scene.wants("stiffness"):
         case.stuck[direction] = way.stuck()
     loads = scene.loads.tangential if scene.wants("tangential") else ()
-    # Each load of a curved contact with frozen forces alone, all others on one way.
-    marches = [np.array([ratio]) for ratio in loads]
-    if scene.wants("tangential") and not (solution.curved and case.state is None):
-        marches = [np.unique(np.concatenate([shares, loads]))]
-    for ratios in marches:
+    shares = PATH_SHARES
+    if curved:
+        # Only where the pressure follows the shear does the way to a load matter.
+        shares = shares[max(loads, default=0.0) > shares] if case.state else shares[:0]
+    if scene.wants("tangential") and (loads or not curved):
+        ratios = np.unique(np.concatenate([shares, loads]))
         load, moved, at = way.march(ratios)
-        if not solution.curved:
-            solution.paths.append(loading.LoadPath(own, load, moved))
-        for ratio in (r for r in loads if r in ratios):
-            solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
+        if not curved:
+            solution.paths.append(LoadPath(solution.sheared_case(case, direction), load, moved))
+        solution.tangential += [at(int(np.searchsorted(ratios, r)), r) for r in loads]
     if scene.wants("cycle"):
-        amplitude = scene.loads.cycle_amplitude if solution.curved else None
+        amplitude = scene.loads.cycle_amplitude if curved else None
         solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
 
 
@@ -269,9 +279,7 @@ class Frozen:
         self.loaded = np.flatnonzero(force > 0.0)
         self.limit = self.friction * force[self.loaded]
         #: mu N on the model
-        self.total = float(self.limit.sum())
-        if solution.curved:
-            self.total = self.friction * case.force / self.copies
+        self.total = self.friction * case.force / self.copies
 
     def _found(
         self,
@@ -279,15 +287,13 @@ class Frozen:
         displacement: float,
         K: Array,
         fields: tuple[Array, Array],
-        nodes: loading.Sheared,
-        state: loading.CoupledState | None = None,
+        nodes: Sheared,
+        state: CoupledState | None = None,
     ) -> TangentialCase:
         """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
-        # with the motion across the load held, or free to follow; 0 where nothing holds
-        tangent = float(K[0, 0])
-        if not self.solution.curved:
-            free = np.linalg.pinv(K, hermitian=True)
-            tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
+        # with the motion across the load free to follow; 0 where nothing holds
+        free = np.linalg.pinv(K, hermitian=True)
+        tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
         case = self.solution.sheared_case(self.case, self.direction, ratio)
         load = ratio * self.friction * self.case.force
         return TangentialCase(
@@ -297,7 +303,7 @@ class Frozen:
     @property
     def compliance(self) -> Array:
         """Of the loaded nodes; it changes while bodies learn."""
-        return loading.tangential_compliance(self.solution.model, self.components, self.loaded)
+        return tangential_compliance(self.solution.model, self.components, self.loaded)
 
     def _moved(self, compliance: Array) -> tuple[Array, float]:
         """Tractions of stuck nodes that move by one along the direction, T = e' C^-1 e."""
@@ -311,7 +317,7 @@ class Frozen:
         for body in (model.upper, model.lower):
             if body.name in self.case.alone:
                 on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
-                C = loading.tangential_compliance(model, self.components, on, body)
+                C = tangential_compliance(model, self.components, on, body)
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
@@ -338,9 +344,7 @@ class Frozen:
         before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
         d, stick = np.atleast_1d(path.displacement[k]), path.state[k] == 0
         load, force = ratio * self.total * self.unit, path.unclipped[k]
-        nodes = loading.Sheared(
-            self.components, self.loaded, self.limit, force, before, d, load, stick
-        )
+        nodes = Sheared(self.components, self.loaded, self.limit, force, before, d, load, stick)
         fields = self._spread(path.force[k]), self._spread(path.slip[k])
         K = np.atleast_2d(path.stiffness[k])
         return self._found(ratio, float(d @ self.unit), K, fields, nodes)
@@ -352,13 +356,13 @@ class Frozen:
         path = self._path(shares)
         return *self._along(path), self.copies * path.slip_work
 
-    def cycle(self, case: Case) -> loading.LoadPath:
+    def cycle(self, case: Case) -> LoadPath:
         """First loading to +T*, then closed loops +T* -> -T* -> +T*, of which the last counts."""
-        shares, first, steps = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+        shares, first, steps = cycle_shares(self.loads.cycle_steps, self.loops)
         T, d, work = self.loop(self.loads.cycle_amplitude * shares)
         area = abs(float(np.trapezoid(T[-steps - 1 :], d[-steps - 1 :])))
         slip_work = work[first:].reshape(self.loops, steps).sum(axis=1)
-        return loading.LoadPath(
+        return LoadPath(
             case, T, d, True, float(slip_work[-1]), area, float(slip_work.max())
         )
 
@@ -367,37 +371,34 @@ class Frozen:
 
         Raises ConvergenceError where a product does not converge.
         """
-        scene, model = self.solution.plan.scene, self.solution.model
-        n = len(model.gap)
-        at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
+        settled(self.solution.model, self.components, self._tractions, lambda found: found)
 
-        def whole(tractions: Array) -> Array:
-            """Tractions at the loaded nodes, on all nodes; column by column."""
-            out = np.zeros((n * len(self.components), *tractions.shape[1:]))
-            out[at] = tractions
-            return out.reshape(len(out), -1)
-
-        def shown(solve: Callable[[], Array], limit: float = KNOWN) -> None:
-            settled(model, self.components, solve, lambda found: [(whole(found), limit)])
-
-        def single(load: Array) -> TangentialContact:
-            target = load if len(load) == 2 else float(load[0])
-            return tangential_contact(self.compliance, self.limit, load=target)
-
-        def both(found: TangentialContact) -> Iterable[tuple[Array, float]]:
-            yield whole(found.force), KNOWN
-            if found.rates is not None:
-                yield whole(found.rates), KNOWN_STIFFNESS
-
-        shown(lambda: self._moved(self.compliance)[0], KNOWN_STIFFNESS)
-        gross = np.zeros(len(self.components) * len(self.limit))
+    def _tractions(self) -> list[tuple[Array, float]]:
+        """Tractions on all nodes, column by column, and the largest share of them that may be
+        unknown: stuck, in gross slip, of every load with its rates, of the cycle.
+        """
+        scene, C = self.solution.plan.scene, self.compliance
+        gross = np.zeros(len(C))
         gross[: len(self.limit)] = self.limit
-        shown(lambda: gross)
-        for ratio in scene.loads.tangential if scene.wants("tangential") else ():
-            settled(model, self.components, partial(single, ratio * self.total * self.unit), both)
+        found = [(self._moved(C)[0], KNOWN_STIFFNESS), (gross, KNOWN)]
+        history = None
+        for ratio in sorted(scene.loads.tangential) if scene.wants("tangential") else ():
+            target = ratio * self.total * (self.unit if len(self.unit) == 2 else self.unit[0])
+            one = tangential_contact(C, self.limit, load=target, history=history)
+            history = one.history
+            found.append((one.force, KNOWN))
+            found += [(one.rates, KNOWN_STIFFNESS)] if one.rates is not None else []
         if scene.wants("cycle"):
-            shares, *_ = loading.cycle_shares(self.loads.cycle_steps, self.loops)
-            shown(lambda: self._path(self.loads.cycle_amplitude * shares).force.T)
+            shares, *_ = cycle_shares(self.loads.cycle_steps, self.loops)
+            found.append((self._path(self.loads.cycle_amplitude * shares).force.T, KNOWN))
+        n = len(self.solution.model.gap)
+        at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
+        out = []
+        for tractions, limit in found:
+            whole = np.zeros((n * len(self.components), *tractions.shape[1:]))
+            whole[at] = tractions
+            out.append((whole, limit))
+        return out
 
     def _spread(self, values: Array) -> Array:
         """(n, 1 or 2) of values at the loaded nodes."""
@@ -415,14 +416,14 @@ class _Coupled(Frozen):
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
         super().__init__(solution, case, direction)
         assert case.state is not None
-        self.state, self.total = case.state, self.friction * case.force
+        self.state = case.state
 
     def stuck(self) -> tuple[float, dict[str, float]]:
         """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
 
-        def secant(state: loading.CoupledState) -> float:
+        def secant(state: CoupledState) -> float:
             size = SMALL_SHEAR * self.friction * float(state.found.load[-1, 0])
-            return size / float(loading.sheared(state, np.array([size]), self.unit, size)[1][0])
+            return size / float(sheared(state, np.array([size]), self.unit, size)[1][0])
 
         alone = {name: one.state for name, one in self.case.alone.items()}
         of = {name: secant(state) for name, state in alone.items() if state is not None}
@@ -431,15 +432,13 @@ class _Coupled(Frozen):
     def march(self, ratios: Array) -> Marched:
         """Shares of mu N one after the other; friction remembers the normal load."""
         needed = max(self.loads.tangential, default=0.0) * self.total
-        states, moved = loading.sheared(self.state, ratios * self.total, self.unit, needed)
+        states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
         return load, np.insert(moved, 0, 0.0), partial(self._to, states, moved)
 
-    def _to(
-        self, states: list[loading.CoupledState], moved: Array, k: int, ratio: float
-    ) -> TangentialCase:
+    def _to(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
         state = states[k]
-        nodes = loading.shear_nodes(self.solution.model, self.friction, state)
+        nodes = shear_nodes(self.solution.model, self.friction, state)
         slip = np.zeros((len(state.force), 2))
         slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
         fields = state.force[:, 1:], slip
@@ -448,7 +447,7 @@ class _Coupled(Frozen):
     def loop(self, shares: Array) -> tuple[Array, Array, Array]:
         """The same; friction remembers the normal load."""
         values, before = shares * self.total, self.state.found.history
-        found = self.state.found.go_on(load=loading.loads_along(self.state, values, self.unit))
+        found = self.state.found.go_on(load=loads_along(self.state, values, self.unit))
         moved = (found.displacement[:, 1:3] - before.motion[1:3]) @ self.unit
         return np.insert(values, 0, 0.0), np.insert(moved, 0, 0.0), found.friction_loss(before)
 
@@ -477,11 +476,6 @@ _SWITCHES: Mapping[str, tuple[str, object]] = {
     planned.COUPLING: ("contact.coupling", "coupled"),
     planned.DIRECTIONS: ("contact.directions", 2),
 }
-#: of a damper that tips over when its tilt is free
-_TIPS = (
-    "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
-    "contact.load_point inside the contact, or choose another contact.distant set"
-)
 
 
 def solve_left_out(solution: ContactSolution, stages: Stages) -> None:
@@ -499,23 +493,21 @@ def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Res
         model = prepare(companion, Stages(), "companion")
         without = _numbers(companion, model)
     for effect in solution.plan.shown:
-        included, remedy = dict[Key, float](), ""
+        included, tips = dict[Key, float](), False
         try:
             if model is not None:
-                included = {(r.name, r.case): r.value for r in _with(effect, companion, model)}
-        except InputError:
-            remedy = _TIPS
-        except (UpdError, np.linalg.LinAlgError):
-            pass
-        yield from _changes(effect, without, included, remedy)
+                found = _numbers(companion, model, _SWITCHES[effect])
+                included = {(r.name, r.case): r.value for r in found}
+        except (UpdError, np.linalg.LinAlgError) as error:
+            tips = isinstance(error, InputError)
+        yield from _changes(effect, without, included, tips=tips)
 
 
 def _changes(
-    effect: str, without: Sequence[Result], included: Mapping[Key, float], remedy: str
+    effect: str, without: Sequence[Result], included: Mapping[Key, float], *, tips: bool
 ) -> Iterator[Resolved]:
-    """The numbers that an effect changes; NaN where none was found with it.
-
-    A body that tips over has neither stiffness nor approach: 0 N/mm, or NaN.
+    """The numbers that an effect changes; NaN where none was found with it, and no stiffness where
+    the body tips over.
     """
     areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
     known = [r for r in without if (r.name, r.case) in included or not included]
@@ -523,10 +515,10 @@ def _changes(
     names = next((row for row in _SHOWN[effect] if had.intersection(row)), ())
     names += _AREAS if effect == planned.COUPLING else ()
     for r in (one for one in known if one.name in names):
-        none = 0.0 if remedy and r.unit == "N/mm" else float("nan")
+        none = 0.0 if tips and r.unit == "N/mm" else float("nan")
         value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
         over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
-        yield Resolved(effect, r.name, r.case, r.value, value, r.unit, remedy, over=over)
+        yield Resolved(effect, r.name, r.case, r.value, value, r.unit, over=over)
 
 
 def _under_load(found: Sequence[Result]) -> list[Result]:
@@ -539,11 +531,3 @@ def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]
     switched = replace(plan, scene=changed(plan.scene, switch))
     with few_threads(model.gap):
         return _under_load(make_results(solve_plan(switched, Stages(), model)))
-
-
-def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:
-    """The companion's numbers with an effect; InputError where its upper body tips over."""
-    if effect == planned.TILT and plan.scene.coupled:
-        # with friction it would not
-        _numbers(plan, model, _SWITCHES[effect], ("contact.coupling", "uncoupled"))
-    return _numbers(plan, model, _SWITCHES[effect])

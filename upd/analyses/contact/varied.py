@@ -29,17 +29,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Plan
-from upd.analyses.contact.bodies import held_sets
-from upd.analyses.contact.faces import rim_nodes
 from upd.analyses.contact.plan import (
     ContactPlan,
     auto_patch,
     hertz_radius,
     is_curved,
+    make_plan,
     refined_growth,
 )
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_normal, solve_plan, solve_tangential
 from upd.analyses.cost import NODES
@@ -81,8 +79,7 @@ from upd.vary.wanted import plan_wanted
 
 #: fewest divisions of a level
 FEWEST = 4
-_NO_DIVISIONS = "the mesh cannot be made coarser: its recipe has no divisions to lower"
-_COARSEST = "the mesh is the coarsest there is: set geometry.divisions to {} or more"
+_COARSEST = f"the mesh cannot be made coarser: give geometry.divisions, {FEWEST + 2} or more"
 #: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
 #: parameters of a recipe that the load may size
@@ -173,12 +170,24 @@ def coarser_divisions(plan: ContactPlan, ratios: Sequence[float]) -> list[int]:
     return found
 
 
-def spacing(parameters: Mapping[str, Any]) -> float:
-    """Size of the contact's elements, but for a factor of its size: of both directions the
-    geometric mean.
+def size_of(parameters: Mapping[str, Any]) -> float:
+    """Size of the contact's elements in mm but for a factor, of both directions the geometric
+    mean: over the edge that is divided, or 1 of a recipe that names none.
     """
+    edges = ("patch", "patch_length", "pad_length")
+    edge = next((float(parameters[n]) for n in edges if n in parameters), 1.0)
     counts = [float(parameters[n]) for n in ("divisions", "divisions_long") if n in parameters]
-    return float(np.prod(counts) ** (-1.0 / len(counts)))
+    return float(edge * np.prod(counts) ** (-1.0 / len(counts)))
+
+
+def _on_mesh(
+    source: str, plan: Plan[Any], geometry: Mapping[str, Any], *extra: tuple[str, Any]
+) -> Variation:
+    """The plan's scene with a mesh of other divisions."""
+    known = {**plan.parameters, **geometry}
+    counts = (str(known[n]) for n in ("divisions_long", "divisions") if n in known)
+    label = " x ".join(counts) + " divisions"
+    return Variation(source, label, (*of_geometry(geometry), *extra), size_of(known))
 
 
 def bare(scene: Scene) -> Overrides:
@@ -210,20 +219,12 @@ def levels(plan: ContactPlan) -> Levels:
     """
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(plan.scene) else COARSER
-    known = isinstance(plan.parameters.get("divisions"), int)
-    why = _COARSEST.format(FEWEST + 2) if known else _NO_DIVISIONS
-    return {MESH: [_coarser(plan, n) for n in coarser_divisions(plan, ratios)] or why}
-
-
-def _coarser(plan: ContactPlan, divisions: int) -> Variation:
-    geometry = level_geometry(plan.parameters, divisions)
-    size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
-    return Variation(MESH, _divisions(geometry), of_geometry(geometry), size)
-
-
-def _divisions(parameters: Mapping[str, Any]) -> str:
-    counts = (str(parameters[n]) for n in ("divisions_long", "divisions") if n in parameters)
-    return " x ".join(counts) + " divisions"
+    made = [
+        _on_mesh(MESH, plan, level_geometry(plan.parameters, n))
+        for n in coarser_divisions(plan, ratios)
+    ]
+    own = size_of(plan.parameters) if made else 1.0
+    return {MESH: [replace(one, size=one.size / own) for one in made] or _COARSEST}
 
 
 def governing(scene: Scene) -> tuple[str, ...]:
@@ -245,15 +246,8 @@ def _curved_level(scene: Scene, nodes: float) -> Overrides:
 
     A patch sized from the largest load, no larger than the scene's, spacing from the smallest.
     """
-    if scene.sphere_radius is None:
-        raise InputError(
-            f"accuracy: the recipe {scene.recipe!r} has no contact radius to size the "
-            'mesh from; give geometry.divisions, and no accuracy or "unknown"'
-        )
-    loads = [F for F in scene.loads.forces if F > 0.0]
-    if not loads:
-        raise InputError("accuracy: needs a positive normal load to size the mesh")
-    radius, patch = hertz_radius(scene, min(loads)), auto_patch(scene)
+    patch = auto_patch(scene)
+    radius = hertz_radius(scene, min(F for F in scene.loads.forces if F > 0.0))
     if scene.geometry.get("patch", "auto") != "auto":
         patch = min(patch, float(scene.geometry["patch"]))
     divisions = 2 * math.ceil(0.5 * patch / radius * nodes)
@@ -296,15 +290,8 @@ def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def edge_of(parameters: Mapping[str, Any]) -> float:
-    """Edge of the contact that is divided, mm; 1 of a recipe that names none."""
-    edges = ("patch", "patch_length", "pad_length")
-    return next((float(parameters[n]) for n in edges if n in parameters), 1.0)
-
-
 def level_of(plan: ContactPlan) -> Variation:
-    known = plan.parameters
-    return Variation(MESH, _divisions(known), size=spacing(known) * edge_of(known))
+    return _on_mesh(MESH, plan, {})
 
 
 def finer(plan: ContactPlan, source: str, factor: float) -> Overrides:
@@ -384,7 +371,7 @@ def _values(
     try:
         solve_normal(near, Stages())
         (one,) = near.normal
-        if rim_nodes(near, one):
+        if near.rim_nodes(one):
             return []
         one.shares = {body: s.over(case.force / load) for body, s in case.shares.items()}
         one.shear_shares = case.shear_shares
@@ -423,8 +410,6 @@ _NUMBERS = (
     "K_N_secant_raw",
     "K_Tx_initial_raw",
     "K_Ty_initial_raw",
-    "approach_damper",
-    "approach_platform",
     "law_k_n",
     "cycle_energy",
 )
@@ -477,31 +462,29 @@ def _usual(plan: Plan[Any]) -> Sequence[int]:
 
 def _meshes(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
     element = plan.scene.mesh.element
-    return [_on_mesh(element, element, n, plan) for n in levels]
+    return [_studied(element, element, n, plan) for n in levels]
 
 
 def _elements(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
     chosen = ((e, max(4, 2 * (n // 4)) if e == "hex27" else n) for e in _FINEST for n in levels)
-    return [_on_mesh(e, e, n, plan) for e, n in chosen if n <= _FINEST[e]]
+    return [_studied(e, e, n, plan) for e, n in chosen if n <= _FINEST[e]]
 
 
 def _solvers(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
     return [
-        _on_mesh(solver, plan.scene.mesh.element, n, plan, ("solver.name", solver))
+        _studied(solver, plan.scene.mesh.element, n, plan, ("solver.name", solver))
         for solver, most in _AFFORDABLE.items()
         if solver != "pardiso" or select.has_pardiso()
         for n in levels[:most]
     ]
 
 
-def _on_mesh(
+def _studied(
     source: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]
 ) -> Variation:
     per_edge = 2 if NODES[element] > 8 else 1
     own = level_geometry(plan.parameters, divisions, per_edge=per_edge)
-    label = f"{own.get('divisions_long', divisions)} x {divisions}"
-    overrides = (*of_geometry(own), ("mesh.element", element), *extra)
-    return Variation(source, label, overrides, edge_of(plan.parameters) / divisions)
+    return _on_mesh(source, plan, own, ("mesh.element", element), *extra)
 
 
 def _patches(plan: Plan[Any], levels: Sequence[int]) -> Iterator[Variation]:
@@ -546,8 +529,10 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
         for value in (factor * length for factor in factors if isinstance(length, float)):
             yield f"{name} {value:g} mm", _lengths({name: value})
     for body, mesh in recipes.build_mesh(scene.recipe, plan.parameters)[0].items():
-        for name in held_sets(mesh):
-            if scene.contact.distant.get(body) != name:
+        for key, nodes in mesh.nodes.items():
+            name = key.removeprefix("distant_")
+            # fewer than three nodes leave a body free to turn
+            if name not in (key, scene.contact.distant.get(body)) and len(nodes) > 2:
                 yield f"{body} held at {name}", ((f"contact.distant.{body}", name),)
     other = "free" if scene.contact.tilt == "held" else "held"
     yield f"tilt {other}", (("contact.tilt", other),)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.charts import face_chart, face_pressure, values
+from upd.analyses.face_charts import face_chart, face_pressure, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.plan import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Axis, Chart, Map, Style, Trace
