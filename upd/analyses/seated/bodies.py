@@ -22,6 +22,13 @@ from upd.reduction import AttachedModel, ReducedModel
 from upd.scene.forced_contact import SIDES, Side
 
 _X, _Y = 0, 1
+#: state of the damper -> the rigid one beside it; of the seated one friction opposes all it can
+RIGID = {
+    "seated": "rigid damper, full friction against F_C",
+    "opposing": "rigid damper, full friction against F_C",
+    "reversed": "rigid damper, full friction along F_C",
+    "frictionless": "rigid damper without friction",
+}
 
 
 @dataclass(frozen=True)
