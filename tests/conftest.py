@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
-from rigs import SET_LINES
 
 from tests.pictures import no_figures
 
@@ -43,7 +42,8 @@ LONG = (
     *("test_accuracy_rounds", "test_damping_over_amplitude", "test_sweep"),
     *("test_measured_runs", "test_input_uncertainty"),
 )
-#: Read by the libraries when they are loaded, which in a worker is after this file.
+#: Read by the libraries when they are loaded, which in a worker is after this file: nothing here
+#: imports numpy at once.
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 _OWN_CACHE = "UPD_TESTS_CACHE"
 
@@ -168,22 +168,11 @@ SMALL: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-#: "symmetric-response" with a few points and one tangent a point
-FEW_POINTS = (
-    *SET_LINES,
-    "mesh.element=hex8i",
-    "contact.static=frictionless",
-    'contact.stiffness=["thesis"]',
-    "contact.rows=[1, 2]",
-    "contact.columns=2",
-    'contact.directions="one"',
-    "reduction.modes=4",
-)
-
-
 @pytest.fixture(scope="session")
 def few_points() -> tuple[str, ...]:
     """Overrides that make the wedge's forced response a quick one."""
+    from rigs import FEW_POINTS
+
     return FEW_POINTS
 
 
