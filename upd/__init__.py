@@ -39,11 +39,11 @@ Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test 
 benchmarks/.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from upd.doors import on_first_use
+
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from upd import contact as contact
@@ -68,11 +68,7 @@ if TYPE_CHECKING:
     from upd.scene import Scene as Scene
     from upd.scene import load_scene as load_scene
     from upd.sizing import design as design
-
-__version__ = "0.2.0"
-
-
-if not TYPE_CHECKING:
+else:
     __getattr__, __dir__, __all__ = on_first_use(
         __name__,
         {
@@ -85,7 +81,6 @@ if not TYPE_CHECKING:
             "batch.studies": "study",
             "sizing": "design",
             "fitting": "fit",
-            "analyses": "make_plan",
-            "analyses.base": "Plan",
+            "analyses": "make_plan Plan",
         },
     )

@@ -1,7 +1,5 @@
 """Contact and friction between condensed bodies."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from upd.doors import on_first_use

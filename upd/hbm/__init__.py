@@ -15,8 +15,6 @@ Multi-harmonic balance, continuation, time-march cross-check.
 True
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from upd.doors import on_first_use
