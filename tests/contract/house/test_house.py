@@ -334,7 +334,7 @@ ROOM_LINES = {
     "measured": 883,
     "reduction": 1116,
     "results": 787,
-    "fem": 728,
+    "fem": 723,
     "matrices": 616,
     "root": 532,
     "cache": 443,
