@@ -35,11 +35,12 @@ COMPILING = ("test_interface_balance", "test_choice")
 #: Files of ten seconds or more, the longest first: begun then, none keeps one worker at the end.
 LONG = (
     *("test_fit", "test_readme", "test_sweep_faults", "test_hertz_scene"),
-    *("test_study", "test_answer", "test_measured_fit", "test_default_estimates"),
+    *("test_study", "test_answer", "test_contact_products", "test_measured_fit"),
+    *("test_default_estimates", "test_modes", "test_graded_meshes"),
     *("test_response_estimates", "test_input_effects", "test_study_faults", "test_report"),
     *("test_scene_studies", "test_report_browser", "test_interface_march", "test_forced_scene"),
     *("test_contact_left_out", "test_doctests", "test_confirmed_peaks", "test_seated_estimates"),
-    *("test_accuracy_rounds", "test_damping_over_amplitude", "test_sweep"),
+    *("test_damping_over_amplitude", "test_sweep"),
     *("test_measured_runs", "test_input_uncertainty"),
 )
 #: Read by the libraries when they are loaded, which in a worker is after this file: nothing here
