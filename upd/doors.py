@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
 
 
-def on_first_use(package: str, homes: dict[str, str]) -> tuple[Any, Any, list[str]]:
+def on_first_use(package: str, homes: dict[str, str]) -> tuple[object, object, list[str]]:
     """``__getattr__``, ``__dir__`` and ``__all__`` of a package that loads its names when they are
     used: what needs few of its modules loads few.
 
@@ -14,7 +13,7 @@ def on_first_use(package: str, homes: dict[str, str]) -> tuple[Any, Any, list[st
     """
     places = {name: module for module, names in homes.items() for name in names.split()}
 
-    def found(name: str) -> Any:
+    def found(name: str) -> object:
         if name not in places:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         if not places[name]:
