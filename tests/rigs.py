@@ -32,6 +32,17 @@ LINES: dict[str, Any] = {
 _OTHER_UNITS = {"mm2": ("um2",), "mrad": ("urad",)}
 #: the same as overrides
 SET_LINES = tuple(f"{key}={value}" for key, value in LINES.items())
+#: "symmetric-response" with a few points and one tangent a point
+FEW_POINTS = (
+    *SET_LINES,
+    "mesh.element=hex8i",
+    "contact.static=frictionless",
+    'contact.stiffness=["thesis"]',
+    "contact.rows=[1, 2]",
+    "contact.columns=2",
+    'contact.directions="one"',
+    "reduction.modes=4",
+)
 
 
 def state_of(

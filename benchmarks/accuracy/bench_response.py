@@ -19,7 +19,7 @@ from upd.hbm.core.fourier import analysis, harmonics, synthesis
 from upd.hbm.springs.points import march
 from upd.hbm.springs.response import parabola
 from upd.hbm.springs.time_integration import steady_state
-from upd.reference.den_hartog import den_hartog_amplitude
+from upd.reference import den_hartog_amplitude
 from upd.reference.friction import (
     jenkins_harmonic,
     jenkins_optimum,

@@ -25,7 +25,7 @@ from upd.contact.products import (
     unknown,
 )
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.multigrid import AT_ONCE
+from upd.linalg.common import AT_ONCE
 from upd.linalg.select import choose_route, contact_routes
 from upd.progress import Stages
 from upd.reduction.learned import LearnedCompliance

@@ -68,7 +68,7 @@ def test_twice_the_centrifugal_force_is_twice_the_amplitude() -> None:
 
 
 def test_a_forced_peak_lies_on_its_mode() -> None:
-    (curve,) = solved().curves
+    (curve,) = solved("350 N").curves
     for peak in curve.peaks["right"]:
         one = modes()[peak.mode]
         a = one.acceleration["right"]
@@ -122,7 +122,7 @@ def test_a_run_leaves_curves_chart_and_table(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # what a run makes of the rig solved above
-    problem = replace(forced.ANALYSIS.problem, solve=lambda *_: solved())
+    problem = replace(forced.ANALYSIS.problem, solve=lambda *_: solved("350 N"))
     known = replace(forced.ANALYSIS, problem=problem)
     monkeypatch.setattr("upd.runner.analysis_of", lambda scene: known)
     result = upd.run("asymmetric-response", overrides=RIG, out=tmp_path / "run", report=False)
@@ -133,7 +133,7 @@ def test_a_run_leaves_curves_chart_and_table(
 
 
 def test_a_reported_peak_that_oscillates_warns(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = solved()
+    found = solved("350 N")
 
     def of_oscillation() -> list[Any]:
         return [one for one in check_solution(found) if one.name == "oscillating motion"]

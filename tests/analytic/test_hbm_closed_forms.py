@@ -18,7 +18,7 @@ from upd.hbm import (
 )
 from upd.hbm.springs.checks import loop_area
 from upd.hbm.springs.response import parabola
-from upd.reference.den_hartog import den_hartog_amplitude
+from upd.reference import den_hartog_amplitude
 from upd.reference.friction import (
     jenkins_optimum,
     jenkins_optimum_frequency,

@@ -162,3 +162,15 @@ def test_a_script_needs_no_guard(tmp_path: Any) -> None:
     )
     told = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
     assert told.stdout.split("\n")[:2] == ["once", "[3.0, 2.0]"]
+
+
+@pytest.mark.skipif("PYTEST_XDIST_WORKER" not in os.environ, reason="of the workers of a whole set")
+def test_workers_of_the_tests_share_the_cores() -> None:
+    """Two threads of each on two cores wait for each other: a fit took ten times as long."""
+    import numpy.linalg
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
+
+    assert numpy.linalg and scipy.linalg
+    limit = int(os.environ["OPENBLAS_NUM_THREADS"])
+    assert [one["num_threads"] for one in threadpool_info() if one["num_threads"] > limit] == []

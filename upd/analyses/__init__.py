@@ -1,4 +1,4 @@
-"""The analyses a scene can call for: packages with an ``ANALYSIS``, or two,
+"""The analyses a scene can call for: modules with an ``ANALYSIS``, or two,
 see `upd.analyses.base`.
 
 The scene names the one it needs.
@@ -27,8 +27,8 @@ _NAMES = {
     "forced response": "forced",
     "seated damper": "seated",
 }
-#: packages with two analyses
-_PACKAGES = {"hertz": "contact", "flat": "contact"}
+#: modules that are not the package of that name
+_MODULES = {"hertz": "contact.analysis", "flat": "contact.analysis", "seated": "seated.analysis"}
 
 
 def analysis_of(scene: AnyScene) -> Analysis:
@@ -42,8 +42,8 @@ def analysis_named(name: str) -> Analysis | None:
 
 
 def _analysis(name: str) -> Analysis:
-    package = import_module(f"upd.analyses.{_PACKAGES.get(name, name)}")
-    found: Analysis = package.ANALYSES[name] if name in _PACKAGES else package.ANALYSIS
+    module = import_module(f"upd.analyses.{_MODULES.get(name, name)}")
+    found: Analysis = module.ANALYSIS if hasattr(module, "ANALYSIS") else module.ANALYSES[name]
     return found
 
 

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from upd.errors import InputError
-from upd.fem.elements import BasisMaker, hex_element
-from upd.fem.material import Material
+from upd.fem.elements import BasisMaker, Material, hex_element
 from upd.mesh import FloatArray, IntArray, Mesh
 
 #: bytes of element matrices handled at a time: large enough to hide Python's overhead, small enough

@@ -26,8 +26,7 @@ from scipy.sparse import csr_array, diags_array, eye_array, kron
 
 from upd.errors import InputError, MeshError
 from upd.fem.assembly import _blocks, _Pattern, _per_hex, _three_components, _weighted_gradients
-from upd.fem.elements import BasisMaker, gauss, hex_element
-from upd.fem.material import Material
+from upd.fem.elements import BasisMaker, Material, gauss, hex_element
 from upd.labels import Shown
 from upd.mesh import FloatArray, IntArray, Mesh
 

@@ -10,8 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
-from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
-from upd.linalg.multigrid import AT_ONCE, MAX_ITERATIONS, MultigridSolver
+from upd.linalg.common import (
+    AT_ONCE,
+    MAX_ITERATIONS,
+    FloatArray,
+    checked_dofs,
+    checked_vectors,
+    log,
+)
 from upd.linalg.schur import Solved
 from upd.linalg.symmetric import checked
 
@@ -60,6 +66,8 @@ def amg_solve(
     ConvergenceError
         When `max_iterations` do not reach `rtol`.
     """
+    from upd.linalg.multigrid import MultigridSolver  # few runs need it
+
     A = checked(K)
     b = checked_vectors(rhs, A.shape[0], "right-hand side")
     if b.ndim != 1:
@@ -122,6 +130,8 @@ def compliance_amg(
     InputError, ConvergenceError
         As for `amg_solve`.
     """
+    from upd.linalg.multigrid import MultigridSolver
+
     A = checked(K)
     b = checked_dofs(dofs, A.shape[0])
     solver = MultigridSolver(A, near_null_space, layout=layout, points=points)

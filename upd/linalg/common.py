@@ -22,6 +22,10 @@ IntArray = NDArray[np.int64]
 Solve = Callable[[FloatArray], FloatArray]
 
 EPS = float(np.finfo(np.float64).eps)
+#: of multigrid
+MAX_ITERATIONS = 3000
+#: right-hand sides that multigrid holds at once
+AT_ONCE = 8
 #: Entries of a matrix worked on at a time, some MB.
 _BLOCK = 2**18
 #: Strips in which a matrix is compared with its transpose; each pass over it costs a little.

@@ -29,7 +29,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.common import FloatArray, checked_vectors, log
+from upd.linalg.common import MAX_ITERATIONS, FloatArray, checked_vectors, log
 from upd.linalg.conjugate import UNSEEN, LowestRitz, conjugate_gradients
 from upd.linalg.nodes import STRONG, aggregates, near_neighbours, padded, places, positions
 from upd.linalg.parallel import in_parallel
@@ -41,9 +41,6 @@ from upd.linalg.symmetric import Matrix
 
 #: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
 COARSEST = 100
-MAX_ITERATIONS = 3000
-#: right-hand sides that are held at once
-AT_ONCE = 8
 MOST_LEVELS = 10
 #: levels from this one on, counted from 0, are visited twice from the one above. On stretched
 #: meshes it has 1 % of the dofs, so that is nearly free; the level before has a fifth

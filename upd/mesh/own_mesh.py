@@ -222,8 +222,6 @@ def _blocks(data: bytes) -> Iterator[_Block]:
     yield block
 
 
-#: endings of the files
-ENDINGS = (".msh", ".inp")
 #: bodies of a rig without its damper, and the one of a rig with the damper glued in
 _BLADES, _GLUED = ("left", "right"), "rig"
 #: node sets of a sector

@@ -16,11 +16,11 @@ from types import ModuleType
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import user_files
 from upd.errors import InputError, did_you_mean
-from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
-from upd.mesh.own_mesh import recipe_of
 
 log = logging.getLogger(__name__)
 
+#: endings of mesh files
+MESH_ENDINGS = (".msh", ".inp")
 #: ready recipes, modules of the geometry package
 READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig", "sector")
 
@@ -89,6 +89,8 @@ def _content(path: Path, what: str) -> bytes:
 @functools.lru_cache(maxsize=4)
 def _read_mesh(path: str, digest: str) -> ModuleType:
     """The user's mesh file as a recipe, read afresh whenever its content changed."""
+    from upd.mesh.own_mesh import recipe_of  # few recipes are meshes
+
     del digest
     return recipe_of(Path(path), geometry_module("blocks").read_msh)
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
-from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
-from upd.linalg.multigrid import AT_ONCE
+from upd.linalg.common import AT_ONCE, EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
 from upd.linalg.schur import Solved, Solver
 
 #: relative error in energy of one product

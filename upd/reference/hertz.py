@@ -1,20 +1,28 @@
-"""Hertz contact of spheres and what goes with it. Units: mm, N, MPa.
+"""Hertz contact of spheres and what goes with it: onset of yield by von Mises without friction, how
+far unlike bodies stick. Units: mm, N, MPa.
 
 The argument written first may be a float or an array; the others broadcast against it.
 
 References
 ----------
-.. [1] K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 3 to 5.
+.. [1] K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 3 to 6.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Generic
 
 import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+from scipy.special import ellipkm1
 
+from upd.errors import InputError
 from upd.reference._checks import FloatArray, Real, elastic, not_negative, plain, positive, require
+
+#: its square is the smallest number
+_SMALLEST = 1e-150
 
 
 @dataclass(frozen=True)
@@ -479,3 +487,200 @@ def punch_pressure(r: Real, a: float, load: float) -> Real:
     )
     p: Real = load / (2 * np.pi * a**2 * np.sqrt((1 - r / a) * (1 + r / a)))
     return p
+
+
+# -- onset of yield --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class YieldPoint:
+    """Where a body under a Hertz contact is stressed most.
+
+    Attributes
+    ----------
+    ratio
+        Largest von Mises stress over the largest pressure p0.
+    depth
+        Of that place over the contact radius: on the axis, or 0 at the contact's edge.
+    """
+
+    ratio: float
+    depth: float
+
+
+def hertz_axis_stress(z: Real, a: float, p0: float, nu: float) -> tuple[Real, Real]:
+    """Stresses on the axis of a Hertz contact: s_r = s_theta, and s_z.
+
+    s_r / p0 = -(1 + nu) [1 - (z/a) atan(a/z)] + 1 / (2 (1 + z^2/a^2)),
+    s_z / p0 = -1 / (1 + z^2/a^2).
+
+    Parameters
+    ----------
+    z : float or ndarray
+        Depth >= 0, mm.
+    a : float
+        Contact radius, mm.
+    p0 : float
+        Largest pressure, MPa.
+    nu : float
+        Poisson ratio.
+
+    Returns
+    -------
+    s_r, s_z : float or ndarray
+        MPa, tension positive.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.45).
+    """
+    not_negative("hertz_axis_stress", z=z, p0=p0)
+    positive("hertz_axis_stress", a=a)
+    elastic("hertz_axis_stress", 1.0, nu)
+    t = np.asarray(z, dtype=float) / a
+    fading = 1.0 / (1.0 + t**2)
+    radial: FloatArray = 0.5 * fading - (1.0 + nu) * (1.0 - t * np.arctan2(1.0, t))
+    return plain(p0 * radial), plain(-p0 * fading)
+
+
+def hertz_yield_point(nu: float) -> YieldPoint:
+    """The most stressed place under a Hertz contact.
+
+    On the axis the von Mises stress is abs(s_r - s_z); at the contact's edge the surface is in pure
+    shear, s_r = -s_theta = (1 - 2 nu) p0 / 3, which is sqrt(3) times that and counts for strongly
+    negative nu only.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson ratio.
+
+    Returns
+    -------
+    YieldPoint
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eqs (3.43), (3.45) and (6.9): for nu = 0.3 a body
+       yields at p0 = 1.60 Y, at the depth 0.48 a.
+
+    Examples
+    --------
+    >>> from upd.reference import hertz_yield_point
+    >>> found = hertz_yield_point(0.3)
+    >>> print(f"p0 = {1.0 / found.ratio:.3f} Y at {found.depth:.3f} a")
+    p0 = 1.613 Y at 0.481 a
+    """
+    elastic("hertz_yield_point", 1.0, nu)
+
+    def difference(t: float) -> float:
+        radial, axial = hertz_axis_stress(t, 1.0, 1.0, nu)
+        return float(radial - axial)
+
+    # s_r - s_z rises from (1 - 2 nu) / 2 to one top and falls to zero from there
+    top = minimize_scalar(lambda t: -difference(t), bounds=(0.0, 2.0), method="bounded")
+    places = [
+        YieldPoint(difference(float(top.x)), float(top.x)),
+        YieldPoint(abs(1.0 - 2.0 * nu) / 2.0, 0.0),
+        YieldPoint(abs(1.0 - 2.0 * nu) / np.sqrt(3.0), 0.0),
+    ]
+    return max(places, key=lambda place: place.ratio)
+
+
+def hertz_yield_load(yield_stress: float, nu: float, radius: float, E_star: float) -> float:
+    """Load in N at which a body under a sphere begins to yield.
+
+    The largest pressure grows with the cube root of the load.
+
+    Parameters
+    ----------
+    yield_stress : float
+        Y of the body, MPa.
+    nu : float
+        Its Poisson ratio.
+    radius : float
+        Of the sphere, mm.
+    E_star : float
+        Contact modulus, MPa.
+
+    Returns
+    -------
+    float
+        N.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (6.10), with the factor of `hertz_yield_point`.
+
+    Examples
+    --------
+    Hardened bearing steel, 1800 MPa, as a ball of 5 mm radius:
+
+    >>> from upd.reference import contact_modulus, hertz_yield_load
+    >>> E_star = contact_modulus(200e3, 0.3, 200e3, 0.3)
+    >>> print(f"{hertz_yield_load(1800.0, 0.3, 5.0, E_star):.0f} N")
+    262 N
+    """
+    positive("hertz_yield_load", yield_stress=yield_stress)
+    p0 = yield_stress / hertz_yield_point(nu).ratio
+    return float((p0 / hertz_sphere(1.0, radius, E_star).max_pressure) ** 3)
+
+
+# -- Spence's indentation with friction ------------------------------------------------------------
+
+
+def sticking_part(beta: float, mu: float) -> float:
+    """Radius of the sticking disk over the contact radius under a growing normal load.
+
+    With c/a = z and K'(z) = K(sqrt(1 - z^2)), K the complete elliptic integral of the first kind,
+
+        1/(2 z) ln((1 + z)/(1 - z)) = (mu/beta) K'(z),
+
+    the same for a flat punch and a sphere, at every load (printed with beta/mu in places, by which
+    no friction would stick everywhere). The shear's own effect on the pressure is neglected, so it
+    is exact for small beta only.
+
+    Parameters
+    ----------
+    beta : float
+        Dundurs' second constant, above zero in size.
+    mu : float
+        Friction, above zero.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        For a beta of zero or a friction that is not positive.
+
+    References
+    ----------
+    .. [1] D. A. Spence, J. Elasticity 5 (1975) 297; K. L. Johnson, Contact Mechanics, section 5.4.
+
+    Examples
+    --------
+    >>> from upd.reference import sticking_part
+    >>> print(f"{sticking_part(0.1, 0.1):.4f}")
+    0.9038
+    """
+    if not abs(beta) > 0.0 or not 0.0 < mu < math.inf:
+        raise InputError(
+            f"sticking part: beta = {beta:g} and mu = {mu:g}: give a beta that is not zero and a "
+            "friction above zero (bodies with beta = 0 stick everywhere under a normal load)."
+        )
+    ratio = mu / abs(beta)
+
+    def off(w: float) -> float:
+        """With z = tanh(w), which a computer can tell from one."""
+        z = math.tanh(w)
+        return w / z - ratio * float(ellipkm1(z * z))
+
+    # K'(z) tends to ln(4/z) for small z: below the smallest z the disk has no radius.
+    if off(_SMALLEST) > 0.0:
+        return 0.0
+    return math.tanh(
+        float(brentq(off, _SMALLEST, 5.0 + math.pi * ratio, xtol=1e-300, maxiter=3000))
+    )

@@ -357,12 +357,12 @@ def test_a_rig_chooses_its_levels() -> None:
         "modes.arrangements": ["symmetric"],
         "modes.below": "400 Hz",
         "left_out.solve": "no",
-        "accuracy": "2.5 %",
+        "accuracy": "6 %",
     }
     found = upd.run("rig", overrides=asked)
     rows = [r for r in found.results if r.name in ("f1_free", "f2_free")]
     assert rows
-    assert all(r.estimated_error is not None and r.estimated_error <= 0.025 for r in rows)
+    assert all(r.estimated_error is not None and r.estimated_error <= 0.06 for r in rows)
     (effect,) = (e for e in found.effects if e["name"] == EFFECT)
     assert "elements along an edge x" in effect["why"]
 

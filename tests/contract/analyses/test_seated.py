@@ -12,7 +12,8 @@ import pytest
 from rigs import undeclared
 
 import upd
-from upd.analyses import make_plan, seated
+from upd.analyses import make_plan
+from upd.analyses.seated.analysis import ANALYSIS
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
 from upd.analyses.seated.solve import SeatedSolution
@@ -45,7 +46,7 @@ PADS = {
 
 def solved(scene: str, overrides: dict[str, Any]) -> SeatedSolution:
     plan = make_plan(load_scene(scene, overrides))
-    solution = seated.ANALYSIS.solve(plan, Stages(silent))
+    solution = ANALYSIS.solve(plan, Stages(silent))
     assert isinstance(solution, SeatedSolution)
     return solution
 
@@ -62,7 +63,7 @@ def pads() -> SeatedSolution:
 
 def value(solution: SeatedSolution, name: str, case: str) -> float:
     return next(
-        r.value for r in seated.ANALYSIS.make_results(solution) if r.name == name and r.case == case
+        r.value for r in ANALYSIS.make_results(solution) if r.name == name and r.case == case
     )
 
 
@@ -154,15 +155,14 @@ def test_half_is_the_whole() -> None:
         solved("symmetric-seated", {**quick, "mesh.symmetry": s}) for s in ("half", "full")
     )
     numbers = [
-        {(r.name, r.case): r.value for r in seated.ANALYSIS.make_results(one)}
-        for one in (half, full)
+        {(r.name, r.case): r.value for r in ANALYSIS.make_results(one)} for one in (half, full)
     ]
     common = numbers[0].keys() & numbers[1].keys()
     assert len(common) > 40
     for key in common:
         size = max(abs(v) for k, v in numbers[1].items() if k[0][:6] == key[0][:6])
         assert numbers[0][key] == pytest.approx(numbers[1][key], rel=1e-5, abs=1e-6 * size), key
-    fields = [seated.ANALYSIS.arrays(one) for one in (half, full)]
+    fields = [ANALYSIS.arrays(one) for one in (half, full)]
     for name, group in fields[0].items():
         if name.startswith("face "):
             for key in ("x", "normal_force", "pressure", "traction_up", "traction_along"):
@@ -244,7 +244,7 @@ def test_a_way_that_fails_leaves_the_raised_state(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Interface, "seat", refuse)
     with pytest.raises(ConvergenceError) as failed:
         solved("symmetric-seated", {**WEDGE, "want": ["seating"]})
-    found = seated.ANALYSIS.make_results(failed.value.partial)  # type: ignore[attr-defined]
+    found = ANALYSIS.make_results(failed.value.partial)  # type: ignore[attr-defined]
     assert {one.name for one in found} >= {"face_N", "contact_area"}
     assert "seating_loss" not in {one.name for one in found}
 
@@ -316,18 +316,18 @@ SPOIL: dict[str, Callable[[SeatedSolution], SeatedSolution]] = {
 
 @pytest.mark.parametrize("name", SPOIL)
 def test_spoiled_seating_fails(wedge: SeatedSolution, name: str) -> None:
-    assert not failing(seated.ANALYSIS.check_solution(wedge))
-    assert name in failing(seated.ANALYSIS.check_solution(SPOIL[name](wedge)))
+    assert not failing(ANALYSIS.check_solution(wedge))
+    assert name in failing(ANALYSIS.check_solution(SPOIL[name](wedge)))
 
 
 def test_every_check_of_a_seating_is_spoiled(wedge: SeatedSolution) -> None:
-    assert {c.name for c in seated.ANALYSIS.check_solution(wedge)} == set(SPOIL)
+    assert {c.name for c in ANALYSIS.check_solution(wedge)} == set(SPOIL)
 
 
 def test_other_ways_of_loading_are_told_when_left_out() -> None:
     """Without the band the run says by how much vibration changes the force, and warns."""
     one = solved("symmetric-seated", {**WEDGE, "want": ["seating"], "left_out.stiffness": 0.05})
-    (check,) = [c for c in seated.ANALYSIS.check_solution(one) if c.name == "other ways of loading"]
+    (check,) = [c for c in ANALYSIS.check_solution(one) if c.name == "other ways of loading"]
     assert check.value > 0.5
     assert not check.passed
     assert 'add "band" to want' in check.remedy

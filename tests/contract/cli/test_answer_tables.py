@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from upd.analyses.base import CHOSEN_BY_ACCURACY
-from upd.analyses.contact import ANALYSES
+from upd.analyses.contact.analysis import ANALYSES
 from upd.cli.tables import print_result
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult

@@ -286,7 +286,7 @@ def test_numbers_that_are_none_are_withheld_and_null(
 ) -> None:
     from dataclasses import replace
 
-    from upd.analyses.contact import ANALYSES
+    from upd.analyses.contact.analysis import ANALYSES
 
     hertz = ANALYSES["hertz"]
     real = hertz.problem.make_results

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from upd import run
-from upd.analyses import contact
+from upd.analyses.contact.analysis import ANALYSES
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.report import write_report
 from upd.report.page import Section, page_text, write_page
@@ -222,8 +222,8 @@ def answered(page: Path) -> Path:
     """The page of the same run, opened on tables of an answer."""
     before, path = page.read_bytes(), page.with_name("answered.html")
     with pytest.MonkeyPatch.context() as patch:
-        hertz = replace(contact.ANALYSES["hertz"], answer=lambda _: ANSWER)
-        patch.setitem(contact.ANALYSES, "hertz", hertz)
+        hertz = replace(ANALYSES["hertz"], answer=lambda _: ANSWER)
+        patch.setitem(ANALYSES, "hertz", hertz)
         write_report(page.parent).rename(path)
     page.write_bytes(before)
     return path

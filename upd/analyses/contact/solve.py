@@ -362,9 +362,7 @@ class Frozen:
         T, d, work = self.loop(self.loads.cycle_amplitude * shares)
         area = abs(float(np.trapezoid(T[-steps - 1 :], d[-steps - 1 :])))
         slip_work = work[first:].reshape(self.loops, steps).sum(axis=1)
-        return LoadPath(
-            case, T, d, True, float(slip_work[-1]), area, float(slip_work.max())
-        )
+        return LoadPath(case, T, d, True, float(slip_work[-1]), area, float(slip_work.max()))
 
     def learn(self) -> None:
         """Show bodies that learn the tractions of every tangential load and of the cycle.

@@ -19,7 +19,7 @@ from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
 from upd.analyses.measured import FREE, STUCK, Computed
-from upd.analyses.seated.results import RIGID
+from upd.analyses.seated.bodies import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.measured.compare import on_path

@@ -47,7 +47,7 @@ from upd.analyses.forced.interface_model import INTERFACE
 from upd.analyses.forced.plan import make_plan
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solve import ForcedSolution, solve
-from upd.analyses.seated.varied import PATCH
+from upd.analyses.seated.plan import PATCH
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.results import Case, ErrorPart, Estimates, Result

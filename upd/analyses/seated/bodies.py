@@ -25,6 +25,13 @@ _X = 0
 #: mirror family of motions of a half -> components the plane y = 0 holds: x and z move evenly in
 #: "x", y does in "y"
 FAMILIES = {"x": [1], "y": [0, 2]}
+#: state of the damper -> the rigid one beside it; of the seated one friction opposes all it can
+RIGID = {
+    "seated": "rigid damper, full friction against F_C",
+    "opposing": "rigid damper, full friction against F_C",
+    "reversed": "rigid damper, full friction along F_C",
+    "frictionless": "rigid damper without friction",
+}
 
 
 @dataclass(frozen=True)

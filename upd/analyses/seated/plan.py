@@ -27,6 +27,12 @@ OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
 #: ways to F_C that differ by friction
 WAYS = (RAISED, AGAIN, OVER, SHAKEN)
 
+#: arrangement -> elements up a patch, and those that go with them, along it first
+PATCH = {
+    "symmetric": ("patch_along_slope", ("patch_along_y",)),
+    "asymmetric": ("pad_along_slope", ("pad_along_y", "face_along_z")),
+}
+
 #: checks of effects omitted; each solves the faces' forces again with it
 WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.base import conditions
-from upd.analyses.seated.bodies import rigid_balance
+from upd.analyses.seated.bodies import RIGID, rigid_balance
 from upd.analyses.seated.interface import Array, Interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
 from upd.analyses.seated.solve import Phase, SeatedSolution
@@ -36,13 +36,6 @@ _FACE = (q.FACE_K_N, q.FACE_K_T_ALONG, q.FACE_K_T)
 _LEG = (q.LEG_K_N, q.LEG_K_T_ALONG, q.LEG_K_T)
 #: rigid damper that slips on both faces, and in which sense friction acts, by phase
 _BALANCES = {RAISED: "opposing", LOWERED: "reversed", AGAIN: "opposing", SMOOTH: "frictionless"}
-#: state of the damper -> the rigid one beside it; of the seated one friction opposes all it can
-RIGID = {
-    "seated": "rigid damper, full friction against F_C",
-    "opposing": "rigid damper, full friction against F_C",
-    "reversed": "rigid damper, full friction along F_C",
-    "frictionless": "rigid damper without friction",
-}
 
 
 #: to which the conditions of contact and the balance hold, of the largest force or motion

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.seated.plan import RAISED, SeatedPlan, make_plan
+from upd.analyses.seated.plan import PATCH, RAISED, SeatedPlan, make_plan
 from upd.analyses.seated.results import ROUNDING, make_results
 from upd.analyses.seated.solve import SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
@@ -134,11 +134,6 @@ PROBLEM = Problem(make_plan, solve, make_results, levels=levels, finer=_finer, c
 
 #: numbers a ladder follows beside those the analysis names first
 _NUMBERS = ("closed_share", "max_pressure", "damper_u?", "seating_loss")
-#: arrangement -> elements up a patch, and those that go with them, along it first
-PATCH = {
-    "symmetric": ("patch_along_slope", ("patch_along_y",)),
-    "asymmetric": ("pad_along_slope", ("pad_along_y", "face_along_z")),
-}
 #: elements up a patch
 _SLOPE = (4, 8, 12, 16)
 _BASE: Overrides = (("want", ["seating", "stiffness"]), ("left_out.solve", "no"))
