@@ -200,7 +200,7 @@ class ModelSource:
         model = _remembered(self._models, frame, lambda: model)
         if self._tangents is None and scene.contact.directions == "auto":
             # once chosen they stay: numbers would jump
-            self._tangents = model.contacts.tangents if model.halved else None
+            self._tangents = model.contacts.tangents if bodies.half else None
         return plan, model
 
     def _frame(self, scene: ForcedScene) -> str:
