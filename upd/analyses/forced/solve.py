@@ -345,9 +345,8 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
             curve = plan, model, solution.linear[name], name, ratio
             work.append(_Work(solution.curves.append, solve_curve, curve, needed=True))
     if scene.wants("performance"):
-        highest = performance.harmonics_of(plan)
         for ratio in performance.ratios_of(plan):
-            point = plan, solution.models[names[0]], ratio, highest
+            point = plan, solution.models[names[0]], ratio
             work.append(_Work(points.append, performance.peaks_at, point))
     work += _mode_work(solution)
     with stages("friction", f"{len(names) * len(order)} curves, {len(work)} pieces"), quiet():
@@ -378,14 +377,13 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
 def _around(
     solution: ForcedSolution,
     variants: Mapping[str, Sequence[again.Variant | SolvedVariation]],
-    points: Sequence[RatioPoint],
+    points: list[RatioPoint],
     beside: SideProcesses,
 ) -> None:
     """What is solved again around the peaks: once, on the reduced models."""
     plan, bodies, first = solution.plan, solution.bodies, next(iter(solution.models))
     assert bodies is not None
     scene, work = plan.scene, list[_Work]()
-    further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
         given = with_totals(plan, name, model), name, model, solution.linear[name]
@@ -397,20 +395,18 @@ def _around(
             solution.omissions += inputs.elastic_changes(run, bodies)
         if name == first:
             if scene.wants("performance"):
-                jobs = performance.further_points(
-                    plan, model, performance.with_curves(points, mine), points
-                )
-                work += [_Work(further.append, *job) for job in jobs]
+                curve = partial(performance.performance_of, solution.linear[name], points, mine)
+                work += [
+                    _Work(points.append, performance.peaks_at, (plan, model, ratio))
+                    for ratio in curve().beside_best()
+                ]
             if scene.wants("inputs") or scene.left_out.solves:
                 work += _at_few_harmonics(solution, run, bodies)
             if scene.wants("band"):
                 work += _band(solution, name)
     _done(beside, work)
     if scene.wants("performance"):
-        mine = tuple(c for c in solution.curves if c.stiffness == first)
-        solution.performances[first] = performance.performance_of(
-            solution.linear[first], performance.with_curves(points, mine), further
-        )
+        solution.performances[first] = curve()
 
 
 def _at_few_harmonics(solution: ForcedSolution, run: again.Run, bodies: Bodies) -> Iterator[_Work]:
@@ -436,7 +432,7 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     """Curves from every other named static state, and other starts of the sliders."""
     plan, model, bodies = solution.plan, solution.models[name], solution.bodies
     assert bodies is not None
-    scene, highest = plan.scene, performance.harmonics_of(plan)
+    scene = plan.scene
     choices: list[tuple[str, Model, str | None]] = []
     if model.state is not None:
         for state in admissible(plan, bodies, Stages()):
@@ -448,7 +444,7 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     choices += [(f"start {s}", model, s) for s in STARTS if s != scene.balance.slider]
     for ratio in scene.excitation.centrifugal_to_force:
         for choice, other, start in choices:
-            point = plan, other, ratio, highest, start
+            point = plan, other, ratio, start
             yield _Work(
                 partial(_into_band, solution, name, choice),
                 performance.peaks_at,

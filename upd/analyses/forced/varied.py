@@ -279,7 +279,7 @@ def _of_best(
     parts: Mapping[Key, tuple[ErrorPart, ...]],
 ) -> tuple[ErrorPart, ...]:
     """The best F_C/F_E lies between its neighbours on the curve; its peak is as well known as the
-    worst known one of the run's curves, beside what more harmonics change there.
+    worst known one of the run's curves.
     """
     performance = solution.performances[one.case.stiffness]
     best = performance.best
@@ -292,9 +292,7 @@ def _of_best(
         error = max((max(r, 1.0 / r) for r in beside), default=math.nan) - 1.0
         why = "the next F_C/F_E on either side"
         return (ErrorPart("points of the curve", error, why),) if beside else ()
-    of, what = q.PEAK_ACCELERANCE, "height"
-    if quantity == q.BEST_FREQUENCY:
-        of, what = q.PEAK_FREQUENCY, "frequency"
+    of = q.PEAK_FREQUENCY if quantity == q.BEST_FREQUENCY else q.PEAK_ACCELERANCE
     mine = [
         found
         for (name, case), found in parts.items()
@@ -306,11 +304,6 @@ def _of_best(
         return ()
     worst = max(mine, key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
-    if performance.again is not None:
-        few, more = (getattr(p.worst, what, math.nan) for p in performance.again)
-        basis = f"change with the harmonics of the run, at F_C/F_E {best.ratio:.3g}"
-        out = [part for part in out if part.source != HARMONICS]
-        out.append(ErrorPart(HARMONICS, abs(more / few - 1.0), basis))
     if quantity == q.BEST_REDUCTION and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]
