@@ -37,7 +37,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -133,17 +133,11 @@ def line_groups(choice: Any, count: int, where: str) -> FloatArray:
         )
     if wanted:
         return lines[wanted]
-    n, share = int(choice), np.zeros((int(choice), count))
-    for line in range(count):
-        # in whole numbers: group k holds k / n <= line / (count - 1) <= (k + 1) / n
-        place, rest = divmod(line * n, count - 1) if count > 1 else (0, 1)
-        on = (
-            {min(place, n - 1), max(place - 1, 0)}
-            if rest == 0 and 0 < place < n
-            else {min(place, n - 1)}
-        )
-        share[list(on), line] = 1.0 / len(on)
-    return share
+    # in whole numbers: group k holds k / n <= line / (count - 1) <= (k + 1) / n
+    n = int(choice)
+    place = np.arange(count) * n - np.arange(n)[:, None] * (count - 1)
+    on = (place >= 0) & (place <= count - 1)
+    return np.asarray(on / on.sum(axis=0))
 
 
 def lattice_points(
@@ -185,9 +179,7 @@ def lattice_points(
     if len(used) == len(share) and np.count_nonzero(share) == len(share):
         # every point is a node: in the order of the points
         nodes, values = found.nodes[share.argmax(axis=1)], np.eye(len(share))
-    lines = np.column_stack(
-        [np.repeat(np.arange(len(up)), len(along)), np.tile(np.arange(len(along)), len(up))]
-    )
+    lines = np.column_stack(np.divmod(np.arange(len(share)), len(along)))
     position = values @ mesh.points[nodes]
     if own:
         position[lines[:, 1] == 0, 1] = 0.0
@@ -275,12 +267,8 @@ def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
     found = [_rectangle(mesh.points, faces[part], frame, rows, count, side) for part in parts]
     weight = np.concatenate([w for w, _ in found])
     values = np.vstack([v for _, v in found])[:, nodes] / weight[:, None]
-    line = [
-        np.column_stack(
-            [np.repeat(np.arange(rows), count), np.tile(np.arange(count), rows) + k * count]
-        )
-        for k in range(len(parts))
-    ]
+    row, column = np.divmod(np.arange(rows * count), count)
+    line = [np.column_stack([row, column + k * count]) for k in range(len(parts))]
     return FacePoints(
         values @ mesh.points[nodes],
         frame,
@@ -376,9 +364,7 @@ def reduced_blades(
     parts = in_parallel(
         [partial(_reduced, plan.scene, bodies, side, faces[side]) for side in SIDES], plan.workers
     )
-    return faces, [
-        one if faces[side].at_nodes else ritz(one) for side, one in zip(SIDES, parts, strict=True)
-    ]
+    return faces, parts
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
@@ -391,12 +377,19 @@ def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
 def _reduced(scene: ForcedScene, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
     """One blade on what its points and probes see: its accelerometer, and where it is excited the
     node of its force.
+
+    A half blade has half of the energy, and its points stand for themselves and their mirror
+    images: K and M of the whole are twice its own.
     """
     excited = side in excitation_of(scene.excitation).blades
     names = ("accelerometer", "force") if excited else ("accelerometer",)
+    twice = 1.0 + bodies.half
     if scene.contact.rule == GAUSS:
-        return _attached(scene, bodies, side, names)
-    return _nodal(scene, bodies, side, face, names)
+        part = _attached(scene, bodies, side, names)
+    else:
+        part = _nodal(scene, bodies, side, face, names)
+    part = replace(part, K=twice * part.K, M=twice * part.M)
+    return part if face.at_nodes else ritz(part)
 
 
 def _nodal(
@@ -429,18 +422,16 @@ def _nodal(
     at_points = np.einsum("mk,kcr->mcr", face.values, nodal.reshape(len(face.nodes), 3, -1))
     if bodies.half:
         at_points[face.position[:, 1] == 0.0, 1] = 0.0
-    seen, twice = model.at(np.array(probes)), 1.0 + bodies.half
     rows = np.einsum("fc,mcr->mfr", face.frame, at_points)
-    return BladePart(twice * model.K, twice * model.M, rows, seen, max(model.n_modes, 1) + _BESIDE)
+    seen = model.at(np.array(probes))
+    return BladePart(model.K, model.M, rows, seen, max(model.n_modes, 1) + _BESIDE)
 
 
 def _attached(scene: ForcedScene, bodies: Bodies, side: Side, names: tuple[str, ...]) -> BladePart:
     """By its lowest modes and the static shapes of its points' and probes' forces.
 
-    A half blade has half of the energy, and its points stand for themselves and their mirror
-    images: K and M of the whole are twice its own. Fewer points are means of those that a body was
-    reduced to before: where models with more points follow, for error estimates, to twice the rows
-    at once.
+    Fewer points are means of those that a body was reduced to before: where models with more points
+    follow, for error estimates, to twice the rows at once.
     """
     blade, most = bodies.blades[side], max(scene.reduction.modes, 1) + _BESIDE
     rows, columns = scene.contact.lines(side)
@@ -449,18 +440,15 @@ def _attached(scene: ForcedScene, bodies: Bodies, side: Side, names: tuple[str, 
         (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] == columns),
         (side, 2 * rows if scene.estimates else rows, columns),
     )
-    _, fine, columns = key
-    many = gauss_points(blade.mesh, fine, columns, side)
+    many = gauss_points(blade.mesh, key[1], columns, side)
     if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
         loads = _loads(blade, many, names)
         found = attachment_modes(blade.K, blade.M, loads, most, solver=scene.solver.name)
         bodies.attached[key] = found
     known = bodies.attached[key]
-    twice = 1.0 + bodies.half
     seen, probes = np.split(known.rows, [3 * many.n_point])
-    at = fewer_rows(many, rows)
-    seen = np.einsum("mn,ncr->mcr", at, seen.reshape(many.n_point, 3, -1))
-    return BladePart(twice * known.K, twice * known.M, seen, probes, most)
+    seen = np.einsum("mn,ncr->mcr", fewer_rows(many, rows), seen.reshape(many.n_point, 3, -1))
+    return BladePart(known.K, known.M, seen, probes, most)
 
 
 def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> FloatArray:

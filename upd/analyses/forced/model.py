@@ -121,16 +121,8 @@ class Model:
     @property
     def system(self) -> dict[str, Any]:
         """What `upd.hbm` takes of it, the excitation aside."""
-        return {
-            "M": self.M,
-            "C": self.C,
-            "K": self.K,
-            "contacts": self.contacts,
-            "static_force": self.static,
-            "damper": self.damper,
-            "damper_rows": self.damper_rows,
-            "slider": self.slider,
-        }
+        own = ("M", "C", "K", "contacts", "damper", "damper_rows", "slider")
+        return {name: getattr(self, name) for name in own} | {"static_force": self.static}
 
     def linear(self, stuck: bool) -> tuple[Array, Array, Array, Array]:
         """M, C, K (n, n) of blades and damper and rows B of the points, without contacts or with

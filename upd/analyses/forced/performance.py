@@ -233,10 +233,9 @@ def performance_arrays(found: Performance) -> dict[str, Any]:
     }
     for (blade, number), mode in sorted(modes.items()):
         rows = np.full((2, len(points)), np.nan)
-        for k, one in enumerate(points):
-            for p in one.peaks:
-                if (p.blade, p.number) == (blade, number):
-                    rows[:, k] = p.frequency, p.height
+        for k, p in ((k, p) for k, one in enumerate(points) for p in one.peaks):
+            if (p.blade, p.number) == (blade, number):
+                rows[:, k] = p.frequency, p.height
         about = {"mode": mode, "blade": blade}
         out[f"peak_{number}_frequency_{blade}"] = variable(at, rows[0], "Hz", **about)
         out[f"peak_{number}_accelerance_{blade}"] = variable(at, rows[1], "(m/s2)/N", **about)
@@ -363,14 +362,13 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
     limit, slope = mu * rest[:, 0], mu * moved[:, 0]
     C = np.sum(rest[:, 1:] ** 2, axis=1) - limit**2
     A = np.sum(moved[:, 1:] ** 2, axis=1) - slope**2
-    found = [np.inf]
-    for sign in (1.0, -1.0):
-        B = 2.0 * sign * (np.sum(rest[:, 1:] * moved[:, 1:], axis=1) - limit * slope)
-        inside = B**2 - 4.0 * A * C
-        below = B + np.sqrt(np.maximum(inside, 0.0))
-        good = (C < 0.0) & (inside >= 0.0) & (below > 0.0)
-        found += list(-2.0 * C[good] / below[good])
-    if not np.isfinite(least := float(min(found))):
+    # one row for each way
+    B = np.outer([2.0, -2.0], np.sum(rest[:, 1:] * moved[:, 1:], axis=1) - limit * slope)
+    inside = B**2 - 4.0 * A * C
+    below = B + np.sqrt(np.maximum(inside, 0.0))
+    good = (C < 0.0) & (inside >= 0.0) & (below > 0.0)
+    found = np.divide(-2.0 * C, below, out=np.full_like(below, np.inf), where=good)
+    if not np.isfinite(least := float(found.min())):
         raise InputError(
             "nonlinear modes: no point sticks at rest and slips as the amplitude grows; give "
             'contact.friction, or contact.static = "frictionless"'

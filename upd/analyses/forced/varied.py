@@ -25,7 +25,7 @@ L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104: the range of data as the s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -288,7 +288,7 @@ def _of_best(
     if quantity == q.BEST_RATIO:
         known = [p.ratio for p in performance.known]
         k = known.index(best.ratio)
-        beside = [known[i] / best.ratio for i in (k - 1, k + 1) if 0 <= i < len(known)]
+        beside = [r / best.ratio for r in known[max(k - 1, 0) : k + 2] if r != best.ratio]
         error = max((max(r, 1.0 / r) for r in beside), default=math.nan) - 1.0
         why = "the next F_C/F_E on either side"
         return (ErrorPart("points of the curve", error, why),) if beside else ()
@@ -515,16 +515,12 @@ def _contact_report(
     return finest_report(scene, [nameless(one) for one in solved], names)
 
 
-def _titled(words: str) -> Callable[[ForcedScene, str], str]:
-    """Titles with the load of a ladder."""
-
-    def title(scene: ForcedScene, vary: str) -> str:
-        return f"{words.format(vary)}, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
-
-    return title
+def _title(scene: ForcedScene, vary: str) -> str:
+    """With the load."""
+    what = "springs and whole faces" if vary == "contact" else f"what accuracy costs, {vary}"
+    return f"{what}, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
 
 
-_title = _titled("what accuracy costs, {}")
 _march = partial(_base, method="march")
 _on_levels = partial(Ladder, follow=_NUMBERS, report=finest_report, title=_title)
 _on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, title=_title)
@@ -552,6 +548,6 @@ LADDERS: Mapping[str, Ladder] = {
         _NUMBERS,
         _contact_report,
         _contact_notes,
-        _titled("springs and whole faces"),
+        _title,
     ),
 }
