@@ -248,8 +248,8 @@ def test_sliders_of_another_number_of_points_are_refused() -> None:
 
 def test_peak_with_static_traction_by_time_march() -> None:
     """From rest in the static state, load put on at once, points slip and lift off: marched to the
-    period, without the harmonic answer. Under other loads the transient leaves other mean tractions,
-    and peaks that are up to 1.2 % lower.
+    period, without the harmonic answer. Under other loads the transient leaves other mean tractions
+    and peaks up to 1.2 % lower.
     """
     plan = planned("asymmetric", static={"left": 0.2, "right": 0.3})
     laws = face_laws(plan.scene.stiffnesses["thesis"], Stages())
