@@ -210,7 +210,7 @@ def test_the_state_of_a_motion_repeats_it_with_forces_at_both_places() -> None:
 
 def test_modes_that_follow_statically_are_pushed_at_both_places() -> None:
     model = excited(ONE, replace(OTHER, phase=70.0))
-    springs = spring_march(model, 0.005, 10, 4)
+    springs = spring_march(model, 0.005, 14, 4)
     moved = springs.march.linear_response(F, model.excitation.read, stuck=True)[:, :2].T
     H = -((2.0 * np.pi * F) ** 2) * 1e-3 * moved
     wanted = accelerances(model, F)
