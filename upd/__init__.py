@@ -33,7 +33,7 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     mesh        Mesh, checks and quality, recipes (the one door to geometry), export
     results     cases, numbers, checks, arrays in netCDF
     cache       files kept on disk: keys, locks, written whole or not at all
-    units, labels, progress, errors, doors (names of a room, loaded when they are used)
+    units, labels, progress, errors, lazy_names (names of a room, loaded when they are used)
 
 Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test can be trusted),
 benchmarks/.

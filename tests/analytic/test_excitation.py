@@ -151,7 +151,7 @@ def test_a_peak_of_a_whole_curve_is_in_the_harmonic_that_is_read() -> None:
         swept = replace(plan.scene.excitation, start=380.0 / k, stop=480.0 / k)
         mine = replace(plan, scene=replace(plan.scene, excitation=swept))
         model = excited(*(replace(one, harmonic=k) for one in (ONE, OTHER)))
-        found = peaks_at(mine, model, 1e5, 3)
+        found = peaks_at(mine, model, 1e5)
         assert found.arrived
         right = [one for one in found.peaks if one.blade == "right"]
         tops.append([v for one in right for v in (one.height, k * one.frequency)])
@@ -210,7 +210,7 @@ def test_the_state_of_a_motion_repeats_it_with_forces_at_both_places() -> None:
 
 def test_modes_that_follow_statically_are_pushed_at_both_places() -> None:
     model = excited(ONE, replace(OTHER, phase=70.0))
-    springs = spring_march(model, 0.005, 10, 4)
+    springs = spring_march(model, 0.005, 14, 4)
     moved = springs.march.linear_response(F, model.excitation.read, stuck=True)[:, :2].T
     H = -((2.0 * np.pi * F) ** 2) * 1e-3 * moved
     wanted = accelerances(model, F)

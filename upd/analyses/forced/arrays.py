@@ -6,7 +6,6 @@ Curves, linear limits, contact points, states, energies, loops, peaks over F_C/F
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from upd.analyses.forced.results import MEASURED_PEAK, printed_of
 from upd.analyses.forced.solve import (
     ContactPlaces,
     ForcedSolution,
-    MarchedPeak,
     marched_damper,
     marched_loops,
 )
@@ -65,8 +63,8 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
         add(LINEAR, name, _linear_arrays(solution, linear))
     for curve in (c for c in solution.curves if not c.empty):
         add(SWEEP if curve.way else FRICTION, curve.case, _curve_arrays(solution, curve))
-    for case, marched in groupby(solution.marched, lambda one: one.sweep.case):
-        add(MARCHED, case, marched_arrays(solution, list(marched)))
+    for sweep in (c for c in solution.curves if c.periods):
+        add(MARCHED, sweep.case, marched_arrays(solution, sweep))
     for name, performance in solution.performances.items():
         add(PERFORMANCE, name, performance_arrays(performance))
     for mode in solution.nonlinear_modes:
@@ -330,15 +328,16 @@ def _swept_arrays(one: SweptCurve) -> Variables:
     }
 
 
-def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
+def marched_arrays(solution: ForcedSolution, sweep: SweptCurve) -> Variables:
     """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
     by the balance with these points.
     """
-    sweep, f = found[0].sweep, np.array([one.frequency for one in found])
+    peaks, periods = sweep.peaks["right"], list(sweep.periods.values())
+    f = sweep.frequency[[one.sample for one in peaks]]
     loops = (
-        (one.peak.number, one.frequency, loop)
-        for one in found
-        for loop in marched_loops(one, N_LOOPS)
+        (one.number, float(at), loop)
+        for one, at, period in zip(peaks, f, periods, strict=True)
+        for loop in marched_loops(solution, sweep, period, N_LOOPS)
     )
     return {
         "frequency": variable("frequency", f, "Hz"),
@@ -346,12 +345,12 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
         **_contact(
             solution,
             sweep,
-            [(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)],
+            [(one.number, one.mode, i) for i, one in enumerate(peaks)],
             f,
-            np.array([one.period.share for one in found]),
+            np.array([one.share for one in periods]),
             # of a half model each node stands for its image too
-            np.array([one.period.copies * one.period.loss for one in found]),
-            np.array([marched_damper(solution, one)[1] for one in found]),
+            np.array([one.copies * one.loss for one in periods]),
+            np.array([marched_damper(solution, sweep, one)[1] for one in periods]),
             loops,
         ),
     }

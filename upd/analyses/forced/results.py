@@ -197,7 +197,6 @@ def _at_peak(
     """
     scene, answer, i = solution.plan.scene, curve.answer, peak.sample
     at = replace(curve.case, peak=peak.number, mode=peak.mode)
-    marched = next((one for one in solution.marched if one.case == at), None)
     if isinstance(answer, FrequencyResponse):
         model = solution.models[curve.stiffness]
         normal = answer.contact_force[i, :, 0, 0]
@@ -205,9 +204,9 @@ def _at_peak(
             yield q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
         state, energy = answer.state[i], float(answer.energy[i].sum())
         motion = [of[i] for of in measures.damper_motion(answer, model)]
-    elif marched is not None:
-        state, energy = marched.period.share, marched.period.energy
-        motion = list(marched_damper(solution, marched))
+    elif (period := curve.periods.get(peak.number)) is not None:
+        state, energy = period.share, period.energy
+        motion = list(marched_damper(solution, curve, period))
     else:
         for of, value in zip(q.SHARES, np.roll(answer.share[i], -1), strict=True):
             yield of.of(value, at)
