@@ -196,7 +196,6 @@ def test_charts_need_no_more_than_the_file(weak: RunResult) -> None:
         "Frequency response",
         "Contact state",
         "Hysteresis",
-        "Friction loss",
         "Damper motion: translation",
         "Damper motion: rotation",
     ]

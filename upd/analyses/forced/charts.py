@@ -78,95 +78,70 @@ class ChartedCurve:
         """Whether a contact point slips or lifts off anywhere on it."""
         return bool(self.data("state")[..., STICK_SHARE].min() < 1.0)
 
+    def slides(self, k: int) -> bool:
+        """Whether a contact point slips at its k-th peak."""
+        return bool(self.data("state")[self.data("peak_index")[k], :, SLIP_SHARE].max() > 0.0)
 
-@dataclass(frozen=True)
-class ChartedPeak:
-    """A peak of a curve: its number, its place on the path, its mode where it is known."""
-
-    curve: ChartedCurve
-    number: int
-    index: int
-    mode: str = ""
-
-    @property
-    def case(self) -> Case:
-        """The curve's, at the peak."""
-        given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
-        return replace(Case(**given), choice="")
-
-    @property
-    def detail(self) -> str:
-        """Where it lies, and the sweep that found it where that is no balance."""
-        words = [f"{self.curve.frequency[self.index]:.1f} Hz"]
-        if self.curve.case.choice:
-            words = ["time integration", self.curve.case.choice, *words]
-        return ", ".join(words)
+    def peak(self, k: int) -> tuple[int, Case, str]:
+        """Place on the path and case of its k-th peak; where that lies, and the sweep that found it
+        where that is no balance.
+        """
+        i, number = int(self.data("peak_index")[k]), int(self.data("peak")[k])
+        modes = str(self.group["peak"].attributes.get("modes", "")).split(", ")
+        case = replace(self.case, peak=number, mode=modes[k] if any(modes) else "", choice="")
+        by = f"time integration, {self.case.choice}, " if self.case.choice else ""
+        return i, case, f"{by}{self.frequency[i]:.1f} Hz"
 
 
-def charted_peaks(curve: ChartedCurve) -> list[ChartedPeak]:
-    """The peaks of a curve."""
-    numbers, index = curve.data("peak"), curve.data("peak_index")
-    words = str(curve.group["peak"].attributes.get("modes", ""))
-    modes = words.split(", ") if words else [""] * len(numbers)
-    return [
-        ChartedPeak(curve, int(number), int(i), mode)
-        for number, i, mode in zip(numbers, index, modes, strict=True)
-    ]
-
-
-def shares_chart(curve: ChartedCurve, k: int) -> Chart:
+def shares_chart(curve: ChartedCurve, side: int) -> Chart:
     """Share of the cycle that one face sticks, slips and is lifted off, stacked over frequency."""
-    share, f = 100.0 * curve.data("share")[:, k], curve.frequency
-    top = np.cumsum(share, axis=1)
-    steps = np.diff(f)
-    turns = not ((steps > 0.0).all() or (steps < 0.0).all())
-    # A path that turns back has several states at one frequency: they are drawn one after the
-    # other.
-    place = np.arange(len(f), dtype=float)
-    x = place if turns else f
+    share, x = 100.0 * curve.data("share")[:, side], curve.frequency
+    top, steps, axis = np.cumsum(share, axis=1), np.diff(x), HZ_AXIS
+    if not ((steps > 0.0).all() or (steps < 0.0).all()):
+        # A path that turns back has several states at one frequency: they are drawn one after the
+        # other.
+        place = np.arange(len(x), dtype=float)
+        at = np.linspace(0, len(x) - 1, PATH_TICKS)
+        ticks = tuple((float(k), f"{np.interp(k, place, x):.1f}") for k in at)
+        axis, x = Axis("frequency along the path", "Hz", ticks=ticks), place
     # A path of one point has no ends.
-    low, high = (float(x[[0, -1]].min()), float(x[[0, -1]].max())) if len(f) > 1 else (None, None)
-    axis = Axis("frequency", "Hz", low=low, high=high)
-    if turns:
-        ticks = tuple(
-            (float(at), f"{np.interp(at, place, f):.1f}")
-            for at in np.linspace(0, len(f) - 1, PATH_TICKS)
-        )
-        axis = Axis("frequency along the path", "Hz", low=low, high=high, ticks=ticks)
+    if len(x) > 1:
+        axis = replace(axis, low=float(x.min()), high=float(x.max()))
     areas = tuple(
         Area(state, x, top[:, j] - share[:, j], top[:, j], j, state)
         for j, state in enumerate(SHARES)
     )
     axes = axis, Axis("share of the cycle", "%", low=0.0, high=100.0)
-    case = f"{curve.case}, {SIDES[k]} face"
+    case = f"{curve.case}, {SIDES[side]} face"
     return _sheet("contact_state", "Contact state", axes, areas=areas, case=case)
 
 
-def contact_maps(at: ChartedPeak, points: Group, k: int) -> Iterator[Chart]:
+def contact_maps(curve: ChartedCurve, k: int, points: Group, side: int) -> Iterator[Chart]:
     """Contact points of one face at a peak: how much of the cycle they slip, and are lifted off."""
-    on, energy = np.asarray(points["face"].data) == k, at.curve.data("energy")[at.index]
+    i, case, detail = curve.peak(k)
+    on, energy = np.asarray(points["face"].data) == side, curve.data("energy")[i]
     # Of all points, so that rounding on a face that sticks does not show.
     most = float(energy.max())
     size = np.maximum(energy[on], 0.0) / most if most > 0.0 else np.zeros(int(on.sum()))
     y, up = (np.asarray(points[name].data)[on] for name in ("along", "up"))
     axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
-    for state, share in zip(SHARES, at.curve.data("state")[at.index][on].T, strict=True):
+    for state, share in zip(SHARES, curve.data("state")[i][on].T, strict=True):
         if state != "stick" and share.any():
             value = Axis(state, "% of the cycle", low=0.0, high=100.0)
             more = {
                 "scatters": (Scatter(y, up, 100.0 * share, size, value),),
-                "case": f"{at.case}, {SIDES[k]} face",
-                "detail": at.detail,
+                "case": f"{case}, {SIDES[side]} face",
+                "detail": detail,
                 "note": "The area of a mark is its friction loss.",
             }
             yield _sheet("contact_map", f"Contact points at the peak: {state}", axes, **more)
 
 
-def loops_chart(at: ChartedPeak) -> Chart:
+def loops_chart(curve: ChartedCurve, k: int) -> Chart:
     """Hysteresis loops of the points that lose most at a peak."""
-    curve = at.curve
+    _, case, detail = curve.peak(k)
     traces: list[Trace] = []
-    for one in np.flatnonzero(curve.data("loop_peak") == at.number):
+    for one in np.flatnonzero(curve.data("loop_peak") == case.peak):
         side, y, up, energy = (
             curve.data(f"loop_{name}")[one] for name in ("side", "along", "up", "energy")
         )
@@ -177,17 +152,8 @@ def loops_chart(at: ChartedPeak) -> Chart:
         )
         traces.append(Trace(label, UM * d, T, "line", len(traces)))
     axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
-    given = {"traces": tuple(traces), "case": at.case.label, "detail": at.detail}
+    given = {"traces": tuple(traces), "case": case.label, "detail": detail}
     return _sheet("hysteresis", "Hysteresis", axes, **given)
-
-
-def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
-    """Friction loss of all points over frequency."""
-    traces = tuple(
-        Trace(c.case.label, c.frequency, 1e3 * c.data("power").sum(axis=1), "line", k)
-        for k, c in enumerate(curves)
-    )
-    return Chart("Friction loss", HZ_AXIS, Axis("power of all contact points", "mW"), traces)
 
 
 def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
@@ -256,54 +222,46 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     the contact and the damper behind them.
     """
     del summary
-    groups, others = with_content(arrays, FRICTION), with_content(arrays, MARCHED)
-    swept = with_content(arrays, SWEEP)
-    ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in [*groups, *swept, *others]))
-    curves, recorded = (
-        [ChartedCurve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in some]
-        for some in (groups, others)
+    groups = [with_content(arrays, content) for content in (FRICTION, SWEEP, MARCHED)]
+    ratios = dict.fromkeys(g.attributes["force_ratio"] for some in groups for g in some)
+    colours = {ratio: k for k, ratio in enumerate(ratios)}
+    curves, swept, recorded = (
+        [ChartedCurve(g, case_of(g), colours[g.attributes["force_ratio"]]) for g in some]
+        for some in groups
     )
-    # the page opens on the lowest F_C/F_E on which something slips
-    shown, shown_recorded = (sorted(some, key=lambda c: c.rank) for some in (curves, recorded))
-    peaks = [
-        one for c in (*shown, *shown_recorded) if "peak" in c.group for one in charted_peaks(c)
-    ]
-    moving = [c for c in shown if c.moves] or shown[:1]
-    sliding = [
-        one for one in peaks if one.curve.data("state")[one.index, :, SLIP_SHARE].max() > 0.0
-    ] or peaks[:1]
-    points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
-    rubbed = [c for c in curves if "loop_peak" in c.group]
+    found = [group for group in with_content(arrays, PERFORMANCE) if group["ratio"].data.size]
     return [
-        *_responses(arrays, curves, {r: k for k, r in enumerate(ratios)}),
-        *(
-            _performance(group)
-            for group in with_content(arrays, PERFORMANCE)
-            if group["ratio"].data.size
-        ),
+        *_responses(arrays, [*curves, *swept], colours),
+        *map(_performance, found),
         *mode_charts(arrays),
         *damping_charts(arrays),
-        *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
-        *(
-            chart
-            for one in sliding
-            if "share" in one.curve.group
-            for k in range(len(SIDES))
-            for chart in contact_maps(one, points[one.case.stiffness], k)
-        ),
-        *(
-            loops_chart(one)
-            for one in sliding
-            if "loop_peak" in one.curve.group and one.number in one.curve.data("loop_peak")
-        ),
-        *([loss_chart(rubbed)] if rubbed else []),
-        *(
-            motion_chart(c, k)
-            for c in shown
-            if "damper_amplitude" in c.group
-            for k in range(len(MOTIONS))
-        ),
+        *_behind(with_content(arrays, POINTS), curves, recorded),
     ]
+
+
+def _behind(
+    points: Sequence[Group], curves: Sequence[ChartedCurve], recorded: Sequence[ChartedCurve]
+) -> Iterator[Chart]:
+    """States, loops and the damper's motion; the page opens on the lowest F_C/F_E on which
+    something slips.
+    """
+    shown = sorted(curves, key=lambda c: c.rank)
+    both, sides = [*shown, *sorted(recorded, key=lambda c: c.rank)], range(len(SIDES))
+    peaks = [(c, k) for c in both if "peak" in c.group for k in range(len(c.data("peak")))]
+    peaks = [(c, k) for c, k in peaks if c.slides(k)] or peaks[:1]
+    places = {group.attributes["stiffness"]: group for group in points}
+    for c in [c for c in shown if c.moves] or shown[:1]:
+        yield from (shares_chart(c, k) for k in sides if "share" in c.group)
+    for c, k in peaks:
+        for side in sides if "share" in c.group else ():
+            yield from contact_maps(c, k, places[c.case.stiffness], side)
+    for c, k in peaks:
+        if "loop_peak" in c.group and c.data("peak")[k] in c.data("loop_peak"):
+            yield loops_chart(c, k)
+    for c in shown:
+        yield from (
+            motion_chart(c, k) for k in range(len(MOTIONS)) if "damper_amplitude" in c.group
+        )
 
 
 def _responses(
@@ -320,14 +278,12 @@ def _responses(
         excited = str(linear["frequency"].attributes.get("excitation", ""))
         detail = ", ".join(part for part in (excited, detail) if part)
         mine = [c for c in curves if c.case.stiffness == name]
-        sweeps = [g for g in with_content(arrays, SWEEP) if g.attributes["stiffness"] == name]
         for blade in BLADES:
             traces = [
                 *measured_traces(arrays, blade, colours),
                 *_limit("free", linear, blade, "dashed"),
                 *_limit("stuck", linear, blade, "dashdot"),
                 *(one for c in mine for one in _curve(c, blade)),
-                *(one for group in sweeps for one in _sweep(group, blade, colours)),
             ]
             marks = [one for c in mine for one in _marks(c, blade)]
             parts = {"traces": tuple(traces), "marks": tuple(marks), "detail": detail}
@@ -353,14 +309,17 @@ def _limit(label: str, group: Group, blade: str, style: Style) -> Iterator[Trace
 
 
 def _curve(curve: ChartedCurve, blade: str) -> Iterator[Trace]:
-    """A curve with friction: unstable parts dashed, under the same name."""
-    H, f = magnitude(curve.group[f"accelerance_{blade}"]), curve.frequency
+    """A curve with friction, unstable parts dashed under the same name; steady motions of a sweep
+    as points.
+    """
+    H, f, case = magnitude(curve.group[f"accelerance_{blade}"]), curve.frequency, curve.case
+    label = Case(force_ratio=case.force_ratio, choice=case.choice).label
     if not H.max() > 0.0:
         return
-    label = Case(force_ratio=curve.case.force_ratio).label
-    stable = np.ones(len(f), bool)
-    if "stable" in curve.group:
-        stable = curve.data("stable") > 0
+    if case.choice:
+        yield Trace(label, f, H, "crosses" if f[-1] < f[0] else "points", curve.colour)
+        return
+    stable = curve.data("stable") > 0 if "stable" in curve.group else np.ones(len(f), bool)
     yield Trace(label, f, _only(H, stable), "line", curve.colour, entry=label)
     if not stable.all():
         yield Trace(f"{label}, unstable", f, _only(H, ~stable), "dotted", curve.colour, entry=label)
@@ -375,30 +334,8 @@ def _only(H: Array, on: Any) -> Array:
 
 
 def _marks(curve: ChartedCurve, blade: str) -> Iterator[Mark]:
-    """The frequency at every peak, and what a slow sweep reaches at a fold."""
+    """The frequency at every peak."""
     names = (f"peak_frequency_{blade}", f"peak_accelerance_{blade}")
-    if set(names) <= set(curve.group) and curve.moves:
+    if set(names) <= set(curve.group) and not curve.case.choice and curve.moves:
         for f, height in zip(*(curve.data(name) for name in names), strict=True):
             yield Mark(float(f), float(height), f"{f:.1f} Hz", curve.colour)
-    if blade != BLADES[0] or "fold_frequency" not in curve.group:
-        return
-    up = curve.data("fold_up") > 0
-    rise = curve.data("fold_reached") - curve.data("fold_before")
-    for k in np.flatnonzero(up & (rise > _SEEN * curve.data("fold_reached"))):
-        f, before, reached = (
-            float(curve.data(f"fold_{name}")[k]) for name in ("frequency", "before", "reached")
-        )
-        yield Mark(f, before, f"a sweep up jumps and reaches {reached:.0f}", curve.colour)
-
-
-#: least jump that is marked, over the height it reaches
-_SEEN = 0.2
-
-
-def _sweep(group: Group, blade: str, colours: Mapping[float | None, int]) -> Iterator[Trace]:
-    """The steady motions of a sweep."""
-    case, f, H = case_of(group), frequency_of(group), magnitude(group[f"accelerance_{blade}"])
-    if H.max() > 0.0:
-        label = Case(force_ratio=case.force_ratio, choice=case.choice).label
-        style: Style = "crosses" if f[-1] < f[0] else "points"
-        yield Trace(label, f, H, style, colours.get(case.force_ratio, 0))
