@@ -161,7 +161,7 @@ def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
         )
         for method in ("balance", "march")
     )
-    assert balanced.value("share_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
+    assert balanced.value("contact_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
     failed = {c.name for c in (*balanced.checks, *marched.checks) if not c.passed}
     # three harmonics are few
     assert not failed - {"truncation"}

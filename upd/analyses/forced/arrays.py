@@ -1,4 +1,4 @@
-"""Arrays of a forced response for result.nc.
+"""What the contact does along the curves of a forced response, and all arrays for result.nc.
 
 Curves, linear limits, contact points, states, energies, loops, peaks over F_C/F_E.
 """
@@ -6,22 +6,19 @@ Curves, linear limits, contact points, states, energies, loops, peaks over F_C/F
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
-from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves
+from upd.analyses.forced.measures import CurvePeak, Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_arrays, performance_arrays
-from upd.analyses.forced.plan import excitation_of
-from upd.analyses.forced.results import MEASURED_PEAK, printed_of
+from upd.analyses.forced.plan import MEASURED_PEAK, excitation_of, printed_of
 from upd.analyses.forced.solve import (
     ContactPlaces,
     ForcedSolution,
-    MarchedPeak,
     marched_damper,
     marched_loops,
 )
@@ -38,6 +35,58 @@ PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
 MODES = "nonlinear mode"
 #: loops kept of a peak
 N_LOOPS = 4
+
+
+class Contact(NamedTuple):
+    """What the contact does at n points of a curve, whichever way that was found.
+
+    Attributes
+    ----------
+    at
+        Number, mode and place of the peaks among the points.
+    frequency
+        (n,) Hz.
+    state, energy
+        (n, n_point, 3) shares of the cycle in stick, slip and open; (n, n_point) losses in a cycle,
+        N mm.
+    motion
+        (n, 6) of the damper, mean and amplitude, mm and rad; None where it is not kept.
+    loops
+        Number of a peak, and a loop; read once.
+    """
+
+    at: Sequence[tuple[int, str, int]]
+    frequency: Array
+    state: Array
+    energy: Array
+    motion: Sequence[Array] | Array | None = None
+    loops: Iterable[tuple[int, Loop]] = ()
+
+
+def contact_of(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Contact | None:
+    """At all points of a path, at the peaks of a sweep whose last periods are kept; else None."""
+    a, f = curve.answer, curve.frequency
+    if isinstance(a, FrequencyResponse):
+        at, model = solution.marked_points(curve), solution.models[curve.stiffness]
+        motion = measures.damper_motion(a, model)
+        loops = ((k, one) for k, _, i in at for one in measures.loops(a, i, N_LOOPS))
+        return Contact(at, f, a.state, a.energy, motion, loops)
+    if isinstance(a, InterfaceResponse):
+        state = np.array([one.nodes for one in a.points])[:, :, [1, 2, 0]]
+        loss = np.array([one.loss for one in a.points])
+        return Contact(solution.marked_points(curve), f, state, loss)
+    found = [one for one in solution.marched if one.sweep.case == curve.case]
+    if not found:
+        return None
+    return Contact(
+        [(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)],
+        np.array([one.frequency for one in found]),
+        np.array([one.period.share for one in found]),
+        # of a half model each node stands for its image too
+        np.array([one.period.copies * one.period.loss for one in found]),
+        np.stack([marched_damper(solution, one) for one in found], axis=1),
+        ((one.peak.number, loop) for one in found for loop in marched_loops(one, N_LOOPS)),
+    )
 
 
 def arrays(solution: ForcedSolution) -> dict[str, Group]:
@@ -64,9 +113,15 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
     for name, linear in solution.linear.items():
         add(LINEAR, name, _linear_arrays(solution, linear))
     for curve in (c for c in solution.curves if not c.empty):
-        add(SWEEP if curve.way else FRICTION, curve.case, _curve_arrays(solution, curve))
-    for case, marched in groupby(solution.marched, lambda one: one.sweep.case):
-        add(MARCHED, case, marched_arrays(solution, list(marched)))
+        contact, peaks = contact_of(solution, curve), _curve_arrays(curve)
+        behind = {} if contact is None else _contact_arrays(solution, curve, contact)
+        if not curve.way:
+            add(FRICTION, curve.case, peaks | behind)
+            continue
+        add(SWEEP, curve.case, peaks)
+        if contact is not None:
+            behind["frequency"] = variable("frequency", contact.frequency, "Hz")
+            add(MARCHED, curve.case, behind)
     for name, performance in solution.performances.items():
         add(PERFORMANCE, name, performance_arrays(performance))
     for mode in solution.nonlinear_modes:
@@ -108,76 +163,77 @@ def _points(solution: ForcedSolution, name: str) -> Variables:
     }
 
 
-def _curve_arrays(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Variables:
+def _curve_arrays(curve: ForcedCurve[Any]) -> Variables:
     """A curve: accelerance of both blades in every harmonic that is excited, its peaks, and what
-    its method knows of the contact.
+    its method alone knows.
     """
-    a = curve.answer
+    a, on = curve.answer, "frequency"
     out: Variables = {
-        "frequency": variable(
-            "frequency", curve.frequency, "Hz", status=a.status, message=a.message
-        ),
+        "frequency": variable(on, curve.frequency, "Hz", status=a.status, message=a.message),
         "excitation_force": variable("", curve.force, "N"),
     }
     for side in SIDES:
         out[f"accelerance_{side}"] = accelerance_array(curve.accelerance[side])
         for k, H in curve.more.items():
             out[f"accelerance_{side}_harmonic_{k}"] = accelerance_array(H[side])
-        out |= peak_arrays(side, curve.peaks[side])
+        out |= _peak_arrays(side, curve.peaks[side])
     if isinstance(a, FrequencyResponse):
-        return out | _point_arrays(solution, curve)
+        words = "0 between two folds, where the frequency falls"
+        return out | {"stable": variable(on, curve.rising.astype(np.int8), "1", words)}
     if isinstance(a, InterfaceResponse):
-        return out | _faces_arrays(solution, curve)
-    return out | _swept_arrays(curve)
+        jumped = np.zeros(len(curve.frequency), np.int8)
+        jumped[list(a.jumps)] = 1
+        words = "whether the motion jumps to another after this point"
+        return out | {"jump": variable(on, jumped, "1", words)}
+    states = "stick slip lift, mean over all points of both faces"
+    kinds = "work of the excitation, lost by damping, by friction"
+    return out | {
+        "share": variable(f"{on} state", a.share[:, [1, 2, 0]], "1", state=states),
+        "energy": variable(f"{on} kind", a.energy, "N mm", kind=kinds),
+        "settled": variable(on, a.settled.astype(np.int8), "1"),
+    }
 
 
-def _contact(
-    solution: ForcedSolution,
-    curve: ForcedCurve[Any],
-    at: Sequence[tuple[int, str, int]],
-    frequency: Array,
-    state: Array,
-    energy: Array,
-    amplitude: Array | None = None,
-    loops: Iterable[tuple[int, float, measures.Loop]] = (),
+def _contact_arrays(
+    solution: ForcedSolution, curve: ForcedCurve[Any], contact: Contact
 ) -> Variables:
-    """What the contact does at points of a curve, as far as it is wanted.
-
-    Parameters
-    ----------
-    at
-        Number, mode and place of the peaks among the points.
-    frequency
-        (n,) Hz.
-    state, energy
-        (n, n_point, 3) shares of the cycle; (n, n_point) losses in a cycle, N mm.
-    amplitude
-        (n, 6) of the damper.
-    loops
-        Number and frequency of a peak, and a loop.
-    """
+    """What the contact does at points of a curve, as far as it is wanted."""
     scene, places = solution.plan.scene, solution.places(curve.stiffness)
-    on = "frequency contact_point"
+    on, energy = "frequency contact_point", contact.energy
+    states, modes = "stick slip lift, shares of the cycle", [mode for _, mode, _ in contact.at]
     out: Variables = {
-        "state": variable(f"{on} state", state, "1", state="stick slip lift, shares of the cycle"),
+        "excitation_force": variable("", curve.force, "N"),
+        "state": variable(f"{on} state", contact.state, "1", state=states),
         "energy": variable(on, energy, "N mm", "friction loss per cycle"),
-        "power": variable(on, 1e-3 * energy * frequency[:, None], "W"),
-        **marked_peaks(at),
+        "power": variable(on, 1e-3 * energy * contact.frequency[:, None], "W"),
+        "peak": variable(
+            "peak",
+            [number for number, *_ in contact.at],
+            long_name="number of the peak's mode; 0 is the highest point of a curve without",
+            # which mode each is, in the same order
+            modes=", ".join(modes),
+        ),
+        "peak_index": variable(
+            "peak", [i for *_, i in contact.at], "", "place of the peak in frequency, from 0"
+        ),
     }
     if scene.wants("contact_state"):
-        share = measures.face_shares(state, places.face, places.weight)
+        share = measures.face_shares(contact.state, places.face, places.weight)
         words = "stick slip lift, mean over the face by stiffness, or area without springs"
         out["share"] = variable(
             "frequency side state", share, "1", side=" ".join(SIDES), state=words
         )
-    if amplitude is not None and scene.wants("damper_motion"):
+    if contact.motion is not None and scene.wants("damper_motion"):
         k = excitation_of(scene.excitation).lowest
         words = f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
-        out["damper_amplitude"] = variable("frequency damper_dof", amplitude, "mm, rad", words)
-    return out | (loop_arrays(list(loops), places) if scene.wants("hysteresis") else {})
+        out["damper_amplitude"] = variable(
+            "frequency damper_dof", contact.motion[1], "mm, rad", words
+        )
+    loops = list(contact.loops) if scene.wants("hysteresis") else []
+    return out | (_loop_arrays(loops, places) if loops else {})
 
 
-def peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
+def _peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
     """Frequencies and heights of the peaks of a curve, no variables when it has none."""
     if not peaks:
         return {}
@@ -188,49 +244,18 @@ def peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
     }
 
 
-def marked_peaks(at: Sequence[tuple[int, str, int]]) -> Variables:
-    """Which points of a curve are its peaks."""
-    return {
-        "peak": variable(
-            "peak",
-            [number for number, *_ in at],
-            long_name="number of the peak's mode; 0 is the highest point of a curve without",
-            # which mode each is, in the same order
-            modes=", ".join(mode for _, mode, _ in at),
-        ),
-        "peak_index": variable(
-            "peak", [i for *_, i in at], "", "place of the peak in frequency, from 0"
-        ),
-    }
-
-
-def loop_arrays(
-    found: Sequence[tuple[int, float, measures.Loop]], places: ContactPlaces
-) -> Variables:
-    """Hysteresis loops at every peak, with what tells them apart.
-
-    The peak, the point's face and place, the loss.
-
-    Parameters
-    ----------
-    found
-        Number and frequency of the peak, and a loop.
-    places
-        Of all points.
+def _loop_arrays(found: Sequence[tuple[int, Loop]], places: ContactPlaces) -> Variables:
+    """Hysteresis loops at peaks, each with the number of its peak, and what tells them apart: the
+    point's face and place, the loss.
     """
-    if not found:
-        return {}
-    loops = [one for *_, one in found]
+    loops = [one for _, one in found]
     point = np.array([one.point for one in loops])
     return {
-        "loop_frequency": variable(
-            "loop", [f for _, f, _ in found], "Hz", "the peak each loop belongs to"
-        ),
         "loop_point": variable("loop", point, "", "contact point of each loop"),
         "loop_displacement": variable("loop sample", [one.displacement for one in loops], "mm"),
         "loop_traction": variable("loop sample", [one.traction for one in loops], "N"),
         "loop_limit": variable("loop sample", [one.limit for one in loops], "N"),
-        "loop_peak": variable("loop", [number for number, *_ in found], "", "number of the peak"),
+        "loop_peak": variable("loop", [number for number, _ in found], "", "number of the peak"),
         "loop_side": variable("loop", places.face[point], flag_meanings="left right"),
         "loop_along": variable("loop", places.along[point], "mm", "place along the damper"),
         "loop_up": variable("loop", places.up[point], "mm", "place up the slope"),
@@ -250,108 +275,9 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
         for side in SIDES:
             out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
             rising = sorted(peaks[side], key=lambda p: p.frequency)
-            out |= peak_arrays(f"{kind}_{side}", rising)
+            out |= _peak_arrays(f"{kind}_{side}", rising)
     damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
     return out | {
         "stuck_mode": variable("mode", [m.frequency for m in linear.modes], "Hz"),
         "damping": damping,
-    }
-
-
-def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
-    """Along a path of points: states, losses, motion of the damper, loops."""
-    answer, model = curve.answer, solution.models[curve.stiffness]
-    at, f = solution.marked_points(curve), answer.frequency
-    loops = (
-        (number, float(f[i]), one)
-        for number, _, i in at
-        for one in measures.loops(answer, i, N_LOOPS)
-    )
-    amplitude = measures.damper_motion(answer, model)[1]
-    return {
-        "stable": variable(
-            "frequency",
-            curve.rising.astype(np.int8),
-            "1",
-            "0 between two folds, where the frequency falls",
-        ),
-        **_fold_arrays(curve),
-        "damper": variable(
-            "frequency damper_dof coefficient",
-            model.damper_dofs(answer.coefficients),
-            "mm, rad",
-            coefficient="a0 a1 b1 ...",
-        ),
-        **_contact(solution, curve, at, f, answer.state, answer.energy, amplitude, loops),
-    }
-
-
-def _fold_arrays(curve: PointCurve) -> Variables:
-    """Where slow sweeps jump, and the heights of the right blade before and after."""
-    if not curve.folds:
-        return {}
-    units = {"frequency": "Hz", "up": "1", "before": "(m/s2)/N", "reached": "(m/s2)/N"}
-    return {
-        f"fold_{name}": variable("fold", [getattr(one, name) for one in curve.folds], unit)
-        for name, unit in units.items()
-    }
-
-
-def _faces_arrays(solution: ForcedSolution, curve: FacesCurve) -> Variables:
-    """Along a curve of whole faces: states and losses of every node, jumps."""
-    answer, on = curve.answer, "frequency"
-    jumped = np.zeros(len(curve.frequency), np.int8)
-    jumped[list(answer.jumps)] = 1
-    state = np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]]
-    loss = np.array([one.loss for one in answer.points])
-    return {
-        "jump": variable(on, jumped, "1", "whether the motion jumps to another after this point"),
-        **_contact(solution, curve, solution.marked_points(curve), curve.frequency, state, loss),
-    }
-
-
-def _swept_arrays(one: SweptCurve) -> Variables:
-    """Along a sweep: states and losses."""
-    found = one.answer
-    return {
-        "share": variable(
-            "frequency state",
-            found.share[:, [1, 2, 0]],
-            "1",
-            state="stick slip lift, mean over all points of both faces",
-        ),
-        "energy": variable(
-            "frequency kind",
-            found.energy,
-            "N mm",
-            kind="work of the excitation, lost by damping, by friction",
-        ),
-        "settled": variable("frequency", found.settled.astype(np.int8), "1"),
-    }
-
-
-def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
-    """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
-    by the balance with these points.
-    """
-    sweep, f = found[0].sweep, np.array([one.frequency for one in found])
-    loops = (
-        (one.peak.number, one.frequency, loop)
-        for one in found
-        for loop in marched_loops(one, N_LOOPS)
-    )
-    return {
-        "frequency": variable("frequency", f, "Hz"),
-        "excitation_force": variable("", sweep.force, "N"),
-        **_contact(
-            solution,
-            sweep,
-            [(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)],
-            f,
-            np.array([one.period.share for one in found]),
-            # of a half model each node stands for its image too
-            np.array([one.period.copies * one.period.loss for one in found]),
-            np.array([marched_damper(solution, one)[1] for one in found]),
-            loops,
-        ),
     }

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from upd.analyses import base, measured
+from upd.analyses import measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
+from upd.analyses.forced.arrays import Contact, contact_of
 from upd.analyses.forced.curves import ForcedCurve, Limit, faces_limit, point_limit
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_results, performance_results
-from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
+from upd.analyses.forced.plan import MEASURED_PEAK, excitation_of, printed_of
+from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
-from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.results.quantities import quantity_of
@@ -145,8 +145,6 @@ def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
 # -- numbers of curves -----------------------------------------------------------------------------
 
 
-#: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
-MEASURED_PEAK = q.FREE_PEAK_FREQUENCY.name
 #: by how much lower than the peak a sweep ends that is reported
 _LOWER = 0.01
 
@@ -183,47 +181,41 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
     ]
     if isinstance(curve.answer, InterfaceResponse):
         results.append(q.PATH_JUMPS.of(len(curve.answer.jumps), case))
+    contact = None if curve.empty else contact_of(solution, curve)
     for peak in curve.peaks.get("right", ()):
         results.append(q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number))
-        results += _at_peak(solution, curve, peak)
+        results += _at_peak(solution, curve, contact, peak)
     return results
 
 
 def _at_peak(
-    solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak
+    solution: ForcedSolution, curve: ForcedCurve[Any], contact: Contact | None, peak: CurvePeak
 ) -> Iterator[Result]:
-    """The contact at a peak, its losses and the damper's motion: of a path by the balance, of the
-    last period of a sweep; of the whole contact where only that is known.
+    """The contact at a peak, its losses and the damper's motion; of a sweep whose last period is
+    not kept the shares and losses of the whole.
     """
-    scene, answer, i = solution.plan.scene, curve.answer, peak.sample
+    scene, answer, f = solution.plan.scene, curve.answer, curve.frequency[peak.sample]
     at = replace(curve.case, peak=peak.number, mode=peak.mode)
-    marched = next((one for one in solution.marched if one.case == at), None)
-    if isinstance(answer, FrequencyResponse):
-        model = solution.models[curve.stiffness]
-        normal = answer.contact_force[i, :, 0, 0]
-        for k, side in enumerate(SIDES):
-            yield q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
-        state, energy = answer.state[i], float(answer.energy[i].sum())
-        motion = [of[i] for of in measures.damper_motion(answer, model)]
-    elif marched is not None:
-        state, energy = marched.period.share, marched.period.energy
-        motion = list(marched_damper(solution, marched))
+    places = {number: k for number, _, k in contact.at} if contact else {}
+    if contact is None or peak.number not in places:
+        lift, _, slip = answer.share[peak.sample]
+        loss = answer.energy[peak.sample, 2]
     else:
-        for of, value in zip(q.SHARES, np.roll(answer.share[i], -1), strict=True):
-            yield of.of(value, at)
-        yield q.FRICTION_ENERGY.of(answer.energy[i, 2], at)
-        return
-    yield from _shares(at, state, solution.places(curve.stiffness))
-    yield q.CONTACT_SLIP.of(state[:, 1].mean(), at)
-    yield q.CONTACT_LIFT.of(state[:, 2].mean(), at)
-    yield q.FRICTION_ENERGY.of(energy, at)
-    if scene.wants("contact_state"):
-        # Their mean traction remembers where the sliders began.
-        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
+        k = places[peak.number]
+        slip, lift = contact.state[k, :, 1:].mean(axis=0)
+        loss = contact.energy[k].sum()
+        if contact.motion is not None and scene.wants("damper_motion"):
+            yield from motion_results(at, *(of[k] for of in contact.motion))
+    yield q.CONTACT_SLIP.of(slip, at)
+    yield q.CONTACT_LIFT.of(lift, at)
+    yield q.FRICTION_ENERGY.of(loss, at)
     if scene.wants("hysteresis"):
-        yield q.FRICTION_POWER.of(energy * curve.frequency[i], at)
-    if scene.wants("damper_motion"):
-        yield from motion_results(at, *motion)
+        yield q.FRICTION_POWER.of(loss * f, at)
+    if isinstance(answer, FrequencyResponse):
+        normal = answer.contact_force[peak.sample, :, 0, 0]
+        face = solution.models[curve.stiffness].face
+        for k, side in enumerate(SIDES):
+            yield q.STATIC_NORMAL.of(normal[face == k].sum(), replace(at, side=side))
 
 
 def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
@@ -287,15 +279,6 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve[Any], blade: Side) -
     return [quantity.of(1.0 - highest / top, case)]
 
 
-def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
-    """Shares of the cycle of each face, from those (n_point, 3) of its points."""
-    for side, share in zip(
-        SIDES, measures.face_shares(state, places.face, places.weight), strict=True
-    ):
-        for quantity, value in zip(q.SHARES, share, strict=True):
-            yield quantity.of(value, replace(at, side=side))
-
-
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------
 
 
@@ -328,24 +311,3 @@ def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
             for k in np.flatnonzero(np.abs(values) > least)
         ]
     return results
-
-
-# -- what was printed and measured -----------------------------------------------------------------
-
-
-def printed_of(plan: ForcedPlan) -> Lookup:
-    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
-    scene, look_up = plan.scene, base.printed_of(plan.scene)
-    ready = base.ready_scene(scene)
-    damped = ready is not None and (
-        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
-        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
-    )
-    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
-
-    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
-        free = case.get("kind") == "free"
-        same = damped and case.get("force_ratio") in ratios
-        return look_up(name, case) if free or same else ()
-
-    return under_load
