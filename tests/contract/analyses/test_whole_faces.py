@@ -107,7 +107,6 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     T, N = (found.value(f"static_{k}", "interface, seated, right") for k in "TN")
     assert pytest.approx(0.6 * N, rel=1e-4) == T
     checks = {c.name: c for c in found.checks}
-    assert checks["static balance"].passed
     assert checks["sweep energy"].passed
     group = found.arrays["sweep interface, F_C/F_E 300, sweep up"]
     loss = data(group["energy"])[:, 2]

@@ -9,7 +9,7 @@ import pytest
 from upd.analyses.base import printed_of, with_printed
 from upd.analyses.contact.results import printed_of as flat_printed_of
 from upd.analyses.forced.plan import make_plan
-from upd.analyses.forced.plan import printed_of as forced_printed_of
+from upd.analyses.forced.results import printed_of as forced_printed_of
 from upd.reference import THESIS_FREQUENCIES, printed_values
 from upd.results import Case, Result
 from upd.scene import load_scene

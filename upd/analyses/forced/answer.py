@@ -6,7 +6,7 @@ From the numbers of a run as they stand in its summary, so that a run folder is 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -116,23 +116,14 @@ def _together(*words: str) -> str:
 
 
 def _static(known: Known) -> AnswerTable:
-    """N and T of both faces, and whether the damper hangs."""
+    """N and T of both faces."""
     forces = [one for one in known.values() if _is(one, q.STATIC_N)]
     mine = [one for one in forces if one.case.stiffness == forces[0].case.stiffness]
     state = mine[0].case.choice if mine else ""
-    empty = [one.case.side for one in mine if one.value == 0.0]
-    note = f'Static state: "{state}".'
-    if empty:
-        note += (
-            f" The {' and '.join(empty)} face carries nothing: the damper hangs on the other by "
-            "friction."
-        )
-    elif state == "frictionless":
-        note += " No mean friction: near what vibration leaves."
     return _table(
         "Static state",
         mine,
-        note,
+        f'Static state: "{state}".',
         ("face", lambda N: N.case.side),
         ("#N, N", lambda N: f"{N.value:.1f}"),
         ("#T, N", lambda N: _text("{:.1f}", _beside(known, N, q.STATIC_T))),
@@ -246,7 +237,7 @@ def _modes(known: Known) -> AnswerTable:
 
 
 def _inputs(known: Known) -> AnswerTable:
-    """The inputs that change the peaks most, beside the numerical error."""
+    """The inputs that change the peaks most."""
     changes: dict[str, list[Result]] = {}
     for one in known.values():
         if _is(one, *_WEIGHTS):
@@ -257,7 +248,7 @@ def _inputs(known: Known) -> AnswerTable:
             -max(abs(one.value) / _WEIGHTS[quantity_of(one.name)[0]] for one in pair[1])
         ),
     )
-    rows: list[tuple[str, ...]] = [
+    rows = [
         (
             name,
             " or ".join(dict.fromkeys(one.case.choice.partition(": ")[2] for one in mine)),
@@ -266,7 +257,6 @@ def _inputs(known: Known) -> AnswerTable:
         )
         for name, mine in ranked[:_INPUTS]
     ]
-    rows += _numerical(known) if rows else ()
     ratios = (one.case.force_ratio or 0.0 for mine in changes.values() for one in mine)
     note = f"Changes of the right blade's peaks at F_C/F_E {min(ratios, default=0.0):g}."
     if others := ", ".join(name for name, _ in ranked[_INPUTS:]):
@@ -279,14 +269,3 @@ def _span(changes: Sequence[Result], quantity: Quantity, digits: int) -> str:
     values = [one.value for one in changes if _is(one, quantity)]
     ends = [f"{end:+.{digits}f}" for end in sorted({min(values), max(values)})] if values else []
     return f"{' to '.join(ends)} %" if ends else ""
-
-
-def _numerical(known: Known) -> Iterator[tuple[str, ...]]:
-    """The largest estimated errors of peaks with friction."""
-    worst = []
-    for quantity in (q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE):
-        mine = [one for one in known.values() if _is(one, quantity) and one.case.force_ratio]
-        errors = [one.estimated_error for one in mine if one.estimated_error is not None]
-        worst.append(f"±{100.0 * max(errors):.1f} %" if errors else "")
-    if any(worst):
-        yield ("numerical error", "largest bound", *worst)

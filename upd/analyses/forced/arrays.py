@@ -15,7 +15,7 @@ from upd.analyses.forced.curves import ForcedCurve, LinearCurves
 from upd.analyses.forced.measures import CurvePeak, Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_arrays, performance_arrays
-from upd.analyses.forced.plan import MEASURED_PEAK, excitation_of, printed_of
+from upd.analyses.forced.plan import excitation_of
 from upd.analyses.forced.solve import (
     ContactPlaces,
     ForcedSolution,
@@ -30,7 +30,7 @@ from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
-POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
+POINTS, LINEAR, FRICTION = "points", "linear", "friction"
 PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
 MODES = "nonlinear mode"
 #: loops kept of a peak
@@ -97,8 +97,8 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
         every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
-        latter what the contact does at its peaks), "performance", every "nonlinear mode", the
-        "measured" peaks, and every "measured curve".
+        latter what the contact does at its peaks), "performance", every "nonlinear mode", and every
+        "measured curve".
     """
     out: dict[str, Group] = {}
     scene = solution.plan.scene
@@ -126,13 +126,7 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
         add(PERFORMANCE, name, performance_arrays(performance))
     for mode in solution.nonlinear_modes:
         add(MODES, mode.case, mode_arrays(mode))
-    out |= measured_arrays(scene.measured) if out else {}
-    measured = printed_of(solution.plan)(MEASURED_PEAK, {})
-    if measured and out:
-        source = ", ".join(dict.fromkeys(one.source for one in measured))
-        frequency = variable("peak", [one.value for one in measured], "Hz", source=source)
-        out["measured peaks"] = Group({"frequency": frequency}, content=MEASURED)
-    return out
+    return out | (measured_arrays(scene.measured) if out else {})
 
 
 def _points(solution: ForcedSolution, name: str) -> Variables:

@@ -13,14 +13,13 @@ from upd.analyses.forced.arrays import (
     FRICTION,
     LINEAR,
     MARCHED,
-    MEASURED,
     MODES,
     PERFORMANCE,
     POINTS,
     SWEEP,
 )
 from upd.analyses.measured import damping_charts, measured_traces
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Mark, Scatter, Style, Trace
+from upd.plot.chart import Area, Array, Axis, Chart, Mark, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Arrays, Case, Group
 from upd.scene.forced_contact import SIDES
@@ -33,11 +32,6 @@ STICK_SHARE, SLIP_SHARE = 0, 1
 PER_N = "(m/s²)/N"
 HZ_AXIS = Axis("frequency", "Hz")
 _HEIGHT = Axis("accelerance", PER_N, log=True)
-#: name, unit, scale, first degree of freedom and names of the damper's motions
-MOTIONS = (
-    ("translation", "µm", 1e3, 0, ("x, across the blades", "y, along the damper", "z, radial")),
-    ("rotation", "mrad", 1e3, 3, ("about x", "about y", "about z")),
-)
 #: ticks of a path that turns back
 PATH_TICKS = 6
 
@@ -156,19 +150,6 @@ def loops_chart(curve: ChartedCurve, k: int) -> Chart:
     return _sheet("hysteresis", "Hysteresis", axes, **given)
 
 
-def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
-    """The damper's degrees of freedom over frequency: amplitudes of the first harmonic."""
-    name, unit, scale, first, names = MOTIONS[kind]
-    amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3].T
-    axes = HZ_AXIS, Axis(f"{name}, first harmonic", unit)
-    # those that symmetry forbids are rounding
-    size = amplitude.max(axis=1)
-    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
-    traces = tuple(Trace(names[k], curve.frequency, amplitude[k], "line", int(k)) for k in shown)
-    title, case = f"Damper motion: {name}", curve.case.label
-    return _sheet("damper_motion", title, axes, traces=traces, case=case)
-
-
 _STAR = 5
 #: curves at most: the highest of all and of single modes
 _MOST = 3
@@ -219,7 +200,7 @@ def mode_charts(arrays: Arrays) -> Iterator[Chart]:
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Responses free, stuck and with friction, and the peaks over F_C/F_E; what was asked for of
-    the contact and the damper behind them.
+    the contact behind them.
     """
     del summary
     groups = [with_content(arrays, content) for content in (FRICTION, SWEEP, MARCHED)]
@@ -242,7 +223,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
 def _behind(
     points: Sequence[Group], curves: Sequence[ChartedCurve], recorded: Sequence[ChartedCurve]
 ) -> Iterator[Chart]:
-    """States, loops and the damper's motion; the page opens on the lowest F_C/F_E on which
+    """States and loops; the page opens on the lowest F_C/F_E on which
     something slips.
     """
     shown = sorted(curves, key=lambda c: c.rank)
@@ -258,17 +239,13 @@ def _behind(
     for c, k in peaks:
         if "loop_peak" in c.group and c.data("peak")[k] in c.data("loop_peak"):
             yield loops_chart(c, k)
-    for c in shown:
-        yield from (
-            motion_chart(c, k) for k in range(len(MOTIONS)) if "damper_amplitude" in c.group
-        )
 
 
 def _responses(
     arrays: Arrays, curves: Sequence[ChartedCurve], colours: Mapping[float | None, int]
 ) -> list[Chart]:
-    """Both blades for every stiffness: free, stuck, every curve with friction, measured peaks."""
-    out, bands = [], tuple(_measured(arrays))
+    """Both blades for every stiffness: free, stuck, every curve with friction, measured ones."""
+    out = []
     for linear in with_content(arrays, LINEAR):
         name = str(linear.attributes["stiffness"])
         f = frequency_of(linear)
@@ -287,17 +264,9 @@ def _responses(
             ]
             marks = [one for c in mine for one in _marks(c, blade)]
             parts = {"traces": tuple(traces), "marks": tuple(marks), "detail": detail}
-            parts |= {"bands": bands, "case": f"{blade} blade, stiffness {name}"}
+            parts |= {"case": f"{blade} blade, stiffness {name}"}
             out.append(_sheet("response", "Frequency response", (x, _HEIGHT), **parts))
     return out
-
-
-def _measured(arrays: Arrays) -> Iterator[Band]:
-    """Measured frequencies, under one name."""
-    for group in with_content(arrays, MEASURED):
-        label = f"measured ({group['frequency'].attributes['source']})"
-        for f in group["frequency"].data:
-            yield Band(label, "x", float(f), float(f))
 
 
 def _limit(label: str, group: Group, blade: str, style: Style) -> Iterator[Trace]:

@@ -367,7 +367,8 @@ def exact_peaks(response: Callable[[Array], ComplexArray], f: Array, grid: Array
         for at, top in found
         if top >= measures.PEAKS_ABOVE * highest
     ]
-    return measures.chosen_peaks(peaks)
+    # the two highest
+    return sorted(sorted(peaks, key=lambda one: -one.height)[:2])
 
 
 def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:

@@ -21,15 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses import base
 from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel, Count
 from upd.analyses.forced.statics import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects, friction_effect, worn_effect
 from upd.hbm.core.fourier import harmonics, sample_count
 from upd.mesh import recipes
-from upd.reference.printed import Lookup, Printed
-from upd.results import quantities as q
 from upd.scene import ForcedScene
 from upd.scene.base import rig_parameters
 from upd.scene.forced import ExcitationChoice, combined_forces
@@ -216,7 +213,7 @@ def effects_of_faces(scene: ForcedScene) -> list[Effect]:
         Effect("damper elasticity", True, "its deformation follows its forces statically"),
         Effect("damper inertia", True, "mass and inertia from its mesh"),
         worn_effect(scene),
-        Effect("static balance", True, _static_words(scene), "static balance"),
+        Effect("static balance", True, _static_words(scene)),
         _harmonics(scene, balanced, "truncation"),
         *centrifugal_effects(scene),
     ]
@@ -260,31 +257,6 @@ def _along(scene: ForcedScene) -> Effect:
     why = changes if c.directions == "auto" else "asked for"
     check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
     return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)
-
-
-# -- what was printed ------------------------------------------------------------------------------
-
-
-#: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
-MEASURED_PEAK = q.FREE_PEAK_FREQUENCY.name
-
-
-def printed_of(plan: ForcedPlan) -> Lookup:
-    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
-    scene, look_up = plan.scene, base.printed_of(plan.scene)
-    ready = base.ready_scene(scene)
-    damped = ready is not None and (
-        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
-        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
-    )
-    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
-
-    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
-        free = case.get("kind") == "free"
-        same = damped and case.get("force_ratio") in ratios
-        return look_up(name, case) if free or same else ()
-
-    return under_load
 
 
 # -- excitation ------------------------------------------------------------------------------------

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from upd.analyses import measured
+from upd.analyses import base
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
 from upd.analyses.forced.arrays import Contact, contact_of
@@ -17,14 +17,15 @@ from upd.analyses.forced.curves import ForcedCurve, Limit, faces_limit, point_li
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_results, performance_results
-from upd.analyses.forced.plan import MEASURED_PEAK, excitation_of, printed_of
+from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solve import ForcedSolution
-from upd.analyses.measured import FREE, STUCK, Computed
+from upd.analyses.measured import FREE, STUCK, Computed, measured_results
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
+from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.results.quantities import quantity_of
@@ -47,7 +48,10 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += performance_results(name, performance)
     for curve_of_mode in solution.nonlinear_modes:
         results += mode_results(curve_of_mode)
-    return results + solution.effects + measured_results(solution)
+    beside = partial(_computed, solution), partial(_nothing, solution)
+    damping = solution.plan.scene.excitation.damping
+    measured = measured_results(solution.plan.scene.measured, *beside, damping)
+    return results + solution.effects + measured
 
 
 def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
@@ -76,17 +80,6 @@ def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
             known = None if state.known is None else getattr(state.known, f"{way}_{side}")
             source = RIGID.get(state.name, "") if known is not None else ""
             yield of.of(values[k], at, known, source, exact=state.name != "seated")
-
-
-def measured_results(solution: ForcedSolution) -> list[Result]:
-    """Every measured curve beside the computed ones of its blade and state."""
-    scene = solution.plan.scene
-    return measured.measured_results(
-        scene.measured,
-        lambda choice: list(_computed(solution, choice)),
-        lambda choice: _nothing(solution, choice),
-        scene.excitation.damping,
-    )
 
 
 def _nothing(solution: ForcedSolution, choice: MeasuredChoice) -> str:
@@ -290,7 +283,8 @@ def _with_measured_peaks(solution: ForcedSolution, results: Sequence[Result]) ->
         if not one.withheld and quantity_of(one.name)[0] == q.PEAK_FREQUENCY:
             curves.setdefault(replace(one.case, mode=""), []).append(k)
     for case, mine in curves.items():
-        for found in look_up(MEASURED_PEAK, case.given()):
+        # under this name they are printed: which of a run's peaks each is stands nowhere
+        for found in look_up(q.FREE_PEAK_FREQUENCY.name, case.given()):
             k = min(mine, key=lambda k: abs(out[k].value - found.value))
             out[k] = replace(out[k], reference=found.value, source=found.source, exact=False)
     return out
@@ -311,3 +305,24 @@ def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
             for k in np.flatnonzero(np.abs(values) > least)
         ]
     return results
+
+
+# -- what was printed and measured -----------------------------------------------------------------
+
+
+def printed_of(plan: ForcedPlan) -> Lookup:
+    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
+    scene, look_up = plan.scene, base.printed_of(plan.scene)
+    ready = base.ready_scene(scene)
+    damped = ready is not None and (
+        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
+        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
+    )
+    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        free = case.get("kind") == "free"
+        same = damped and case.get("force_ratio") in ratios
+        return look_up(name, case) if free or same else ()
+
+    return under_load

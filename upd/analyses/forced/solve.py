@@ -184,15 +184,11 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
     count
         Loops at most.
     """
-    period, out = one.period, []
-    friction = one.sweep.answer.model.friction
-    for p in measures.losing_most(period.loss, count):
-        traction = period.force[:, 1:, p].T
-        motion = period.slip[:, :, p].T + one.places.compliance[p] * traction
-        motion -= motion.mean(axis=1, keepdims=True)
-        limit = friction[p] * period.force[:, 0, p]
-        out.append(measures.loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
-    return out
+    period, friction = one.period, one.sweep.answer.model.friction
+    force = period.force.transpose(2, 1, 0)
+    motion = period.slip.transpose(2, 1, 0) + one.places.compliance[:, None, None] * force[:, 1:]
+    motion -= motion.mean(axis=2, keepdims=True)
+    return measures.largest_loops(period.loss, motion, force, friction, count)
 
 
 def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:
