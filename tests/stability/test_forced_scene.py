@@ -120,7 +120,7 @@ def test_linear_peaks_do_not_depend_on_the_frequencies_asked_for(points: int) ->
 
 def test_static_forces_are_those_of_the_wedge(weak: RunResult) -> None:
     for side in ("left", "right"):
-        N = weak.value("static_normal", f"{case(weak)}, at peak 2, out of phase, {side}")
+        N = weak.value("static_N", f"thesis, frictionless, {side}")
         assert pytest.approx(350.0 / (2.0 * np.cos(np.pi / 4)), rel=1e-6) == N
 
 
@@ -182,7 +182,7 @@ def test_cases_are_data_and_come_back_from_the_file(weak: RunResult) -> None:
     for entry in (*weak.rows, *weak.checks):
         assert entry.case == Case(**entry.case.given())
         assert not entry.case.name or entry.case.name == "performance"
-    sides = {r.case.side for r in weak.rows if r.name == "static_normal"}
+    sides = {r.case.side for r in weak.rows if r.name == "static_N"}
     assert sides == {"left", "right"}
 
 

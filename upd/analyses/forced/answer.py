@@ -45,22 +45,12 @@ Known = Mapping[tuple[str, Case], Result]
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Peaks free and of the curve of the lowest F_C/F_E on which something slips, its reduction and
-    loss, the best F_C/F_E, the stuck frequencies, the static forces of both faces.
+    """Peaks free and of the curve of the lowest F_C/F_E, which slips most, its reduction and loss,
+    the best F_C/F_E, the stuck frequencies, the static forces of both faces.
     """
-    cases = [(one, Case(**one["case_fields"])) for one in results]
-    slipping = {
-        (case.stiffness, case.force_ratio)
-        for one, case in cases
-        if one["name"] == q.CONTACT_SLIP.name and one["value"]
-    }
-
-    def order(pair: tuple[Entry, Case]) -> tuple[bool, float]:
-        ratio = pair[1].force_ratio
-        return ratio is not None and (pair[1].stiffness, ratio) not in slipping, ratio or 0.0
-
     first: dict[tuple[bool, int, str, str], Entry] = {}
-    for entry, case in sorted(cases, key=order):
+    cases = [(Case(**one["case_fields"]), one) for one in results]
+    for case, entry in sorted(cases, key=lambda pair: pair[0].force_ratio or 0.0):
         rank = next((k for k, one in enumerate(MAIN) if fnmatchcase(entry["name"], one)), None)
         side = case.side if entry["name"] in (q.STATIC_N.name, q.STATIC_T.name) else ""
         # The peaks of the stuck curve are the stuck frequencies.

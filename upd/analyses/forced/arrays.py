@@ -12,7 +12,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves
-from upd.analyses.forced.measures import CurvePeak, Loop
+from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_arrays, performance_arrays
 from upd.analyses.forced.plan import excitation_of
@@ -170,7 +170,10 @@ def _curve_arrays(curve: ForcedCurve[Any]) -> Variables:
         out[f"accelerance_{side}"] = accelerance_array(curve.accelerance[side])
         for k, H in curve.more.items():
             out[f"accelerance_{side}_harmonic_{k}"] = accelerance_array(H[side])
-        out |= _peak_arrays(side, curve.peaks[side])
+        if peaks := curve.peaks[side]:
+            at, height = f"peak_{side}", [one.height for one in peaks]
+            out[f"peak_frequency_{side}"] = variable(at, [one.frequency for one in peaks], "Hz")
+            out[f"peak_accelerance_{side}"] = variable(at, height, "(m/s2)/N")
     if isinstance(a, FrequencyResponse):
         words = "0 between two folds, where the frequency falls"
         return out | {"stable": variable(on, curve.rising.astype(np.int8), "1", words)}
@@ -227,17 +230,6 @@ def _contact_arrays(
     return out | (_loop_arrays(loops, places) if loops else {})
 
 
-def _peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
-    """Frequencies and heights of the peaks of a curve, no variables when it has none."""
-    if not peaks:
-        return {}
-    at = f"peak_{name}"
-    return {
-        f"peak_frequency_{name}": variable(at, [p.frequency for p in peaks], "Hz"),
-        f"peak_accelerance_{name}": variable(at, [p.height for p in peaks], "(m/s2)/N"),
-    }
-
-
 def _loop_arrays(found: Sequence[tuple[int, Loop]], places: ContactPlaces) -> Variables:
     """Hysteresis loops at peaks, each with the number of its peak, and what tells them apart: the
     point's face and place, the loss.
@@ -258,20 +250,14 @@ def _loop_arrays(found: Sequence[tuple[int, Loop]], places: ContactPlaces) -> Va
 
 
 def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
-    """Accelerance of both blades free and stuck, their peaks, the stuck modes, the damping."""
-    excited = excitation_of(solution.plan.scene.excitation)
-    told = {} if excited.usual else {"excitation": excited.words}
-    out: Variables = {"frequency": variable("frequency", linear.frequency, "Hz", **told)}
-    for kind, curves, peaks in (
-        ("free", linear.free, linear.free_peaks),
-        ("stuck", linear.stuck, linear.stuck_peaks),
-    ):
-        for side in SIDES:
-            out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
-            rising = sorted(peaks[side], key=lambda p: p.frequency)
-            out |= _peak_arrays(f"{kind}_{side}", rising)
-    damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
-    return out | {
-        "stuck_mode": variable("mode", [m.frequency for m in linear.modes], "Hz"),
-        "damping": damping,
+    """Accelerance of both blades free and stuck, the damping."""
+    choice = solution.plan.scene.excitation
+    excited = excitation_of(choice).words
+    out: Variables = {
+        "frequency": variable("frequency", linear.frequency, "Hz", excitation=excited),
+        "damping": variable("", choice.damping, "1", "modal damping ratio"),
     }
+    for kind, curves in (("free", linear.free), ("stuck", linear.stuck)):
+        for side in SIDES:
+            out[f"accelerance_{kind}_{side}"] = accelerance_array(curves[side])
+    return out

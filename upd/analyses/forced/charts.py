@@ -62,12 +62,6 @@ class ChartedCurve:
         return frequency_of(self.group)
 
     @property
-    def rank(self) -> tuple[bool, float]:
-        """Curves on which a contact point slips come first, by rising F_C/F_E."""
-        slips = self.data("state")[..., SLIP_SHARE].max() > 0.0
-        return not slips, float(self.case.force_ratio or 0.0)
-
-    @property
     def moves(self) -> bool:
         """Whether a contact point slips or lifts off anywhere on it."""
         return bool(self.data("state")[..., STICK_SHARE].min() < 1.0)
@@ -223,11 +217,11 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
 def _behind(
     points: Sequence[Group], curves: Sequence[ChartedCurve], recorded: Sequence[ChartedCurve]
 ) -> Iterator[Chart]:
-    """States and loops; the page opens on the lowest F_C/F_E on which
-    something slips.
-    """
-    shown = sorted(curves, key=lambda c: c.rank)
-    both, sides = [*shown, *sorted(recorded, key=lambda c: c.rank)], range(len(SIDES))
+    """States and loops; the page opens on the lowest F_C/F_E, which slips most."""
+    shown, others = (
+        sorted(some, key=lambda c: c.case.force_ratio or 0.0) for some in (curves, recorded)
+    )
+    both, sides = [*shown, *others], range(len(SIDES))
     peaks = [(c, k) for c in both if "peak" in c.group for k in range(len(c.data("peak")))]
     peaks = [(c, k) for c, k in peaks if c.slides(k)] or peaks[:1]
     places = {group.attributes["stiffness"]: group for group in points}

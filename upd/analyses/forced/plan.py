@@ -77,9 +77,8 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     again *= solves and (scene.estimates or scene.left_out.solves)
     cost.seconds += again
     symmetry = "full" if scene.mesh.symmetry == "full" else "half"
-    effects = effects_of_faces(scene) if whole else effects_of_points(scene)
     return ForcedPlan.of(
-        cost, symmetry, parameters, effects, needs, _FILES_S, estimate_seconds=again
+        cost, symmetry, parameters, effects_of(scene), needs, _FILES_S, estimate_seconds=again
     )
 
 
@@ -175,47 +174,46 @@ def grid(plan: ForcedPlan) -> Array:
 # -- what is simulated and left out ----------------------------------------------------------------
 
 
-def effects_of_points(scene: ForcedScene) -> list[Effect]:
-    """Of contact by springs at points."""
-    b, elastic = scene.balance, ELASTIC if scene.left_out.solves else ""
-    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
-    fit = "the faces fit each other"
+def effects_of(scene: ForcedScene) -> list[Effect]:
+    """All of them, of springs at points or of all nodes of both faces."""
+    even = "rig, load and contact are even about y = 0: an even motion excites no odd one"
+    whole = scene.mesh.symmetry == "full"
     return [
-        friction_effect(scene, "; a curve stuck everywhere is answered linearly"),
-        _along(scene),
-        *_motion_and_excitation(scene),
-        Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
-        Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
-        Effect.either(
-            "blades spread by F_C",
-            not scene.contact.loaded,
-            f"{fit} without load",
-            f"{fit} under F_C, worn in",
-        ),
-        Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
-        _harmonics(scene, f"0 to {b.harmonics}; {samples} samples", CONFIRMED),
-        Effect(
-            "damper elasticity", False, "in the contact stiffness; the body moves rigidly", elastic
-        ),
-        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
+        *(_of_faces(scene) if scene.contact.model == "interface" else _of_points(scene)),
+        Effect.either("motion odd about y = 0", whole, "the full model", even),
+        Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x"),
+        Effect("lift-off", True, "every point of the contact may open"),
+        Effect("static balance", True, _static_words(scene)),
+        Effect("damper inertia", True, "mass and inertia from its mesh"),
         *centrifugal_effects(scene),
     ]
 
 
-def effects_of_faces(scene: ForcedScene) -> list[Effect]:
-    """Of contact by all nodes of both faces."""
+def _of_points(scene: ForcedScene) -> list[Effect]:
+    """Contact by springs at points."""
+    b, elastic = scene.balance, ELASTIC if scene.left_out.solves else ""
+    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
+    fit, spread = "the faces fit each other", "blades spread by F_C"
+    loaded, rigid = scene.contact.loaded, "in the contact stiffness; the body moves rigidly"
+    return [
+        friction_effect(scene, "; a curve stuck everywhere is answered linearly"),
+        _along(scene),
+        Effect.either(spread, not loaded, f"{fit} without load", f"{fit} under F_C, worn in"),
+        _harmonics(scene, f"0 to {b.harmonics}; {samples} samples", CONFIRMED),
+        Effect("damper elasticity", False, rigid, elastic),
+        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
+    ]
+
+
+def _of_faces(scene: ForcedScene) -> list[Effect]:
+    """Contact by all nodes of both faces."""
     balanced = f"0 to {scene.balance.harmonics} of the blades; contact and damper in time"
     return [
         friction_effect(scene),
         Effect("normal and tangential coupling", True, "solved together at every step in time"),
-        *_motion_and_excitation(scene),
-        Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "its deformation follows its forces statically"),
-        Effect("damper inertia", True, "mass and inertia from its mesh"),
         worn_effect(scene),
-        Effect("static balance", True, _static_words(scene)),
         _harmonics(scene, balanced, "truncation"),
-        *centrifugal_effects(scene),
     ]
 
 
@@ -223,16 +221,6 @@ def _harmonics(scene: ForcedScene, balanced: str, check: str) -> Effect:
     if scene.balance.method == "march":
         return Effect("harmonics", True, "all: time integration")
     return Effect("harmonics", True, balanced, check)
-
-
-def _motion_and_excitation(scene: ForcedScene) -> list[Effect]:
-    """Motion that the half model does not have; which blades the excitation acts on."""
-    even = "rig, load and contact are even about y = 0: an even motion excites no odd one"
-    whole = scene.mesh.symmetry == "full"
-    return [
-        Effect.either("motion odd about y = 0", whole, "the full model", even),
-        Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x"),
-    ]
 
 
 def _static_words(scene: ForcedScene) -> str:
@@ -304,11 +292,6 @@ class Excitation:
     def free_blades(self) -> tuple[Side, ...]:
         """Those that move without a damper, in the harmonic that is read."""
         return tuple(side for side, a in zip(self.blades, self.read, strict=True) if a != 0.0)
-
-    @property
-    def usual(self) -> bool:
-        """Whether F_E on the right blade is all of it."""
-        return self.blades == ("right",) and self.drive.tolist() == [[1.0]]
 
     @property
     def words(self) -> str:

@@ -21,8 +21,6 @@ from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.measured import FREE, STUCK, Computed, measured_results
 from upd.analyses.seated.results import RIGID
-from upd.hbm import FrequencyResponse
-from upd.hbm.faces.balance import InterfaceResponse
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
 from upd.reference.printed import Lookup, Printed
@@ -172,8 +170,6 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
         *_folds(curve),
         *_more_harmonics(curve),
     ]
-    if isinstance(curve.answer, InterfaceResponse):
-        results.append(q.PATH_JUMPS.of(len(curve.answer.jumps), case))
     contact = None if curve.empty else contact_of(solution, curve)
     for peak in curve.peaks.get("right", ()):
         results.append(q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number))
@@ -187,7 +183,7 @@ def _at_peak(
     """The contact at a peak, its losses and the damper's motion; of a sweep whose last period is
     not kept the shares and losses of the whole.
     """
-    scene, answer, f = solution.plan.scene, curve.answer, curve.frequency[peak.sample]
+    answer, wants = curve.answer, solution.plan.scene.wants
     at = replace(curve.case, peak=peak.number, mode=peak.mode)
     places = {number: k for number, _, k in contact.at} if contact else {}
     if contact is None or peak.number not in places:
@@ -197,18 +193,11 @@ def _at_peak(
         k = places[peak.number]
         slip, lift = contact.state[k, :, 1:].mean(axis=0)
         loss = contact.energy[k].sum()
-        if contact.motion is not None and scene.wants("damper_motion"):
+        if contact.motion is not None and wants("damper_motion"):
             yield from motion_results(at, *(of[k] for of in contact.motion))
     yield q.CONTACT_SLIP.of(slip, at)
     yield q.CONTACT_LIFT.of(lift, at)
     yield q.FRICTION_ENERGY.of(loss, at)
-    if scene.wants("hysteresis"):
-        yield q.FRICTION_POWER.of(loss * f, at)
-    if isinstance(answer, FrequencyResponse):
-        normal = answer.contact_force[peak.sample, :, 0, 0]
-        face = solution.models[curve.stiffness].face
-        for k, side in enumerate(SIDES):
-            yield q.STATIC_NORMAL.of(normal[face == k].sum(), replace(at, side=side))
 
 
 def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
