@@ -14,10 +14,9 @@ from rigs import state_of
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.arrays import arrays
 from upd.analyses.forced.interface_model import by_coulomb, make_springs
 from upd.analyses.forced.model import respond
-from upd.analyses.forced.results import make_results
+from upd.analyses.forced.results import arrays, make_results
 from upd.analyses.forced.solve import (
     ForcedSolution,
     MarchedPeak,

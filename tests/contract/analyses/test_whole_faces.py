@@ -143,7 +143,7 @@ def test_the_balance_of_a_small_force_is_the_stuck_response() -> None:
             assert found.value(name, case) == pytest.approx(found.value(name, wanted), rel=rel)
     assert not any(name.startswith("sweep") for name in found.arrays)
     checks = {c.name: c for c in found.checks}
-    assert all(checks[k].passed for k in ("path complete", "balance residual", "energy balance"))
+    assert all(checks[k].passed for k in ("path complete", "energy balance"))
 
 
 def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
@@ -165,7 +165,7 @@ def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
     failed = {c.name for c in (*balanced.checks, *marched.checks) if not c.passed}
     # three harmonics are few
     assert not failed - {"truncation"}
-    assert {c.name for c in balanced.checks} >= {"balance residual", "energy balance"}
+    assert "energy balance" in {c.name for c in balanced.checks}
     path = balanced.arrays["friction interface, F_C/F_E 800"]
     swept = marched.arrays["sweep interface, F_C/F_E 800, sweep up"]
     here, there = (

@@ -61,10 +61,9 @@ _MOST_POINTS = 400
 
 def run_curve(curve: PointCurve) -> PointCurve:
     """The curve without its path, which is long: its balance, peaks and tops stay."""
-    answer = curve.answer
-    bare = {f.name: getattr(answer, f.name) for f in fields(answer)}
-    bare = {name: one[:0] for name, one in bare.items() if isinstance(one, np.ndarray)}
-    return replace(curve, accelerance={}, more={}, answer=replace(answer, **bare))
+    found = {f.name: getattr(curve.answer, f.name) for f in fields(curve.answer)}
+    bare: Any = {name: one[:0] for name, one in found.items() if isinstance(one, np.ndarray)}
+    return replace(curve, accelerance={}, more={}, answer=replace(curve.answer, **bare))
 
 
 class Run(NamedTuple):
@@ -402,12 +401,12 @@ def count_of(scene: ForcedScene, key: str) -> int:
     return int(scene.geometry.get(key, default))
 
 
-def meshed(scene: ForcedScene) -> tuple[str, ...]:
+def meshed(scene: ForcedScene) -> list[str]:
     """Counts that its mesh is refined by: on the contact too, where the contact points are none of
     its nodes.
     """
     on = _ON_CONTACT[scene.arrangement] if scene.contact.rule == GAUSS else ()
-    return (*OFF_CONTACT, *(key for key in GRADED if on and key.startswith(on)))
+    return [key for key in GRADED if key in OFF_CONTACT or key.startswith(on)]
 
 
 def _rounded(scene: ForcedScene, key: str, count: float) -> int:

@@ -32,7 +32,6 @@ WIDEST_STEP = 0.5
 _BALANCE = 1e-6
 
 
-_REPORT = "report this scene"
 _PERIOD = "|work - damping - friction| / their sum, of a period"
 _PATH = "curves that stopped early, or points that are not periodic"
 _CONFIRMED = "|time integration / harmonic balance - 1| at the peak"
@@ -57,19 +56,17 @@ _RULES: Mapping[str, tuple[float, str, str]] = {
         "at {count} points the contact forces do not come back to their start, so that they are no "
         'steady state: balance.slider = "mid", or contact.directions = "one"',
     ),
-    "balance residual, points": (
+    "balance residual": (
         _BALANCE,
         "misfit of contact motion and force at the worst point, evaluated again, relative",
         "that point is off by about this share, beside a contact that changes its state: read the "
         "curve there from its neighbours",
     ),
-    # corrections of Newton's method end at 1e-6 of the unknowns, and their square remains
-    "balance residual, nodes": (
-        1e-6,
-        "misfit of blades' forces, slips and damper's motion of a period, relative",
-        _REPORT,
+    "energy balance, points": (
+        _BALANCE,
+        "|work - viscous loss - friction| / work",
+        "report this scene",
     ),
-    "energy balance, points": (_BALANCE, "|work - viscous loss - friction| / work", _REPORT),
     # slips are weighted with the mean of the forces at the ends of a step: of the step's square
     "energy balance, nodes": (1e-2, _PERIOD, "take more samples: balance.samples"),
     "truncation": (
@@ -192,7 +189,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator
     elif isinstance(answer, InterfaceResponse):
         yield from _faces_checks(curve, e.points, excitation_of(e).lowest)
     else:
-        yield _check("balance residual, points", case, measures.residual_error(answer))
+        yield _check("balance residual", case, measures.residual_error(answer))
         yield _check("energy balance, points", case, float(np.abs(answer.energy_balance).max()))
         yield from _integrated(curve)
         yield from _oscillating(curve)
@@ -256,7 +253,7 @@ def _open_energy(energy: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
 
 
 def _faces_checks(curve: FacesCurve, points: int, harmonic: int) -> Iterator[Check]:
-    """What remains of the equations and of a period's energy, harmonics left out, steps at peaks.
+    """What remains of a period's energy, harmonics left out, steps at peaks.
 
     Parameters
     ----------
@@ -266,9 +263,7 @@ def _faces_checks(curve: FacesCurve, points: int, harmonic: int) -> Iterator[Che
         That is read.
     """
     answer, case, highest = curve.answer, curve.case, curve.answer.equations.highest
-    residual = max(one.residual for one in answer.points)
     truncated = max(one.unresolved for one in answer.points)
-    yield _check("balance residual, nodes", case, float(residual))
     yield _check("energy balance, nodes", case, float(_open_energy(answer.energy).max()))
     yield _check("truncation", case, float(truncated), highest=highest, more=highest + 2)
     # the steps beside the right blade's peaks against their widths
