@@ -281,10 +281,7 @@ _HEIGHT = Axis("accelerance", PER_N, log=True)
 PATH_TICKS = 6
 
 
-Axes = tuple[Axis, Axis]
-
-
-def _sheet(figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
+def _sheet(figure: str, title: str, axes: tuple[Axis, Axis], **parts: Any) -> Chart:
     """A chart on a sheet of the run folder."""
     return Chart(title, *axes, figure=figure, columns=2, size=(6.4, 4.4), **parts)
 

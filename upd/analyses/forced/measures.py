@@ -29,11 +29,8 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: mm to m
 _M = 1e-3
-_TINY = float(np.finfo(float).tiny)
 #: peaks lower than this part of the highest are not reported
 PEAKS_ABOVE = 0.1
-#: rigid motions of a damper
-MOTIONS = 6
 
 
 @dataclass(frozen=True)
@@ -263,7 +260,7 @@ def residual_error(answer: FrequencyResponse) -> float:
     b, worst = answer.balance, 0.0
     for f, x, kept in zip(answer.frequency, answer.x, answer.contact_force, strict=True):
         off = np.abs(b.force(x) - kept).max()
-        forces = off / max(float(np.abs(kept).max()), _TINY)
+        forces = off / max(float(np.abs(kept).max()), np.finfo(float).tiny)
         worst = max(worst, b.misfit(x, float(2.0 * np.pi * f)), float(forces))
     return worst
 

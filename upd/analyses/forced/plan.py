@@ -33,9 +33,6 @@ from upd.scene.forced import ExcitationChoice, combined_forces
 from upd.scene.forced_contact import GAUSS, SIDES, Side
 
 Array = NDArray[np.float64]
-#: harmonics of the blades and samples in a period where the scene leaves them to the rule: two
-#: more harmonics change peaks by up to 0.5 %, twice the samples by 0.05 %
-HARMONICS, SAMPLES = 3, 128
 #: checks of omitted effects; each solves a number again with the effect
 ALONG = "sliding along y"
 CONFIRMED = "confirmed by time integration"
@@ -55,7 +52,8 @@ _PERIODS, _MARCH_S, _MARCH_POINT_S = 150.0, 1.2e-6, 4e-8
 _CLOSER, _MARCHED, _DOF_S, _ITERATIONS, _MOVED_S, _MATRICES = 130.0, 3.2e4, 2e-7, 250.0, 8e-7, 10.0
 # Figures, files and page.
 _FILES_S = 5.0
-#: time steps in a period of a time integration where the scene names none
+#: time steps in a period where the scene names none: of whole faces twice as many change peaks by
+#: 0.05 %
 MARCH_SAMPLES = 128
 
 
@@ -93,9 +91,8 @@ def _add_whole_faces(cost: CostModel, scene: ForcedScene) -> None:
         solved = 2.0 * curves * _CLOSER * math.log(e.stop / e.start)
         cost.seconds += solved * _MARCHED * _DOF_S * m
     else:
-        samples = SAMPLES if scene.balance.samples == "auto" else int(scene.balance.samples)
         slides = scene.contact.friction > 0.0
-        cost.seconds += _ITERATIONS * curves * samples * slides * _MOVED_S * m
+        cost.seconds += _ITERATIONS * curves * time_steps(scene) * slides * _MOVED_S * m
     cost.kept_bytes += _MATRICES * 8.0 * m**2
 
 
@@ -146,7 +143,7 @@ def _add_curves(cost: CostModel, scene: ForcedScene) -> None:
 
 
 def time_steps(scene: ForcedScene) -> int:
-    """Steps in a period of every march."""
+    """Steps in a period of every march, and samples of whole faces by the balance."""
     given = scene.balance.samples
     return MARCH_SAMPLES if given == "auto" else int(given)
 
@@ -282,11 +279,6 @@ class Excitation:
     def read(self) -> ComplexArray:
         """(L,) amplitudes of the lowest harmonic over F_E."""
         return np.asarray(self.drive[:, self.lowest - 1])
-
-    @property
-    def at_start(self) -> NDArray[np.float64]:
-        """(L,) forces at t = 0 over F_E."""
-        return np.asarray(self.drive.real.sum(axis=1))
 
     @property
     def free_blades(self) -> tuple[Side, ...]:

@@ -201,9 +201,9 @@ def _more_harmonics(curve: ForcedCurve[Any]) -> Iterator[Result]:
     for k, H in curve.more.items() if not curve.empty else ():
         for blade in SIDES[::-1]:
             f, size = curve.frequency, np.abs(H[blade])
-            top = max(measures.path_maxima(f, size), key=lambda p: p.height, default=None)
             i = int(size.argmax())
-            at, height = (float(f[i]), float(size[i])) if top is None else top[:2]
+            tops = measures.path_maxima(f, size) or [CurvePeak(float(f[i]), float(size[i]), i)]
+            at, height, *_ = max(tops, key=lambda top: top.height)
             yield q.HARMONIC_FREQUENCY.on(blade).of(at, curve.case, n=k)
             yield q.HARMONIC_ACCELERANCE.on(blade).of(height, curve.case, n=k)
 

@@ -166,7 +166,7 @@ def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -
         damper = solution.models[name].damper
         rest, kept = np.zeros(damper.n_dof), list(damper.kept)
     period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
-    motion = np.zeros((len(period.motion), measures.MOTIONS))
+    motion = np.zeros((len(period.motion), 6))
     motion[:, kept] = period.motion - rest
     return MarchedPeak(sweep, peak, period, solution.places(name), motion)
 
