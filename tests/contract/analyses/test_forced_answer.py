@@ -82,7 +82,6 @@ def test_one_row_for_every_ratio_and_mode_free_first_then_falling_force() -> Non
     found = [tuple(cell.replace(".0 %", " %") for cell in row) for row in table.rows]
     assert found == rows
     assert all(len(row) == len(table.columns) for row in table.rows)
-    assert "not reached" not in table.note
 
 
 def test_every_head_of_a_number_is_marked() -> None:
@@ -108,15 +107,6 @@ def test_only_where_a_fold_is_a_column_tells_what_a_sweep_reaches() -> None:
 def test_a_sweep_without_a_free_peak_compares_with_none() -> None:
     table = told(*(r for r in RUN if r.case.kind != "free"))["Peaks"]
     assert {row[6] for row in table.rows} == {""}
-
-
-def test_peaks_that_were_not_reached_are_counted() -> None:
-    at = replace(ratio(60.0), mode=MODES[2])
-    lost = Quantity("peak_2_frequency", "Hz").withheld(at, "the path stopped at 300 Hz")
-    high = Quantity("peak_2_accelerance", "(m/s2)/N").withheld(at, "the path stopped at 300 Hz")
-    table = told(*RUN, lost, high)["Peaks"]
-    assert len(table.rows) == 4
-    assert table.note.endswith("1 peaks were not reached: see the notes.")
 
 
 def test_several_stiffnesses_and_sweeps_have_their_names() -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import LinearCurves, PointCurve, linear_of, stuck_frequency
+from upd.analyses.forced.curves import LinearCurves, PointCurve, Top, linear_of, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
 from upd.analyses.forced.model import (
     BAND,
@@ -230,8 +230,7 @@ def peak_again(
     top, old = curve.tops[side, number], curve.answer.balance
     plan, model = other.plan, other.model
     b = balance_of(plan, model, curve.force, plan.scene.harmonic_numbers)
-    stuck, now = (stuck_frequency(one.linear.modes, number % 2 == 1) for one in (run, other))
-    ratio = now / stuck if math.isfinite(now / stuck) else 1.0
+    ratio = expected(run.linear, other.linear, top, number)
     alike = (len(b.Psi), b.contacts.tangents, b.rigid)
     if alike == (len(old.Psi), old.contacts.tangents, old.rigid):
         x = b.embedded(top.x, old)
@@ -262,6 +261,24 @@ def peak_again(
             if peak.number == number and near:
                 return peak.frequency, peak.height
     raise ConvergenceError("not found on the level")
+
+
+def expected(own: LinearCurves, other: LinearCurves, top: Top, number: int) -> float:
+    """Ratio of a peak's frequency on another model to that of the run, between those of the free
+    and of the stuck mode by where the peak lies.
+    """
+    stuck, again = (stuck_frequency(one.modes, number % 2 == 1) for one in (own, other))
+    start, free = (_free(one) for one in (own, other))
+    if not math.isfinite(stuck + again + start + free) or stuck == start:
+        return again / stuck if math.isfinite(again / stuck) else 1.0
+    share = min(max((top.frequency - start) / (stuck - start), 0.0), 1.0)
+    return free / start + share * (again / stuck - free / start)
+
+
+def _free(linear: LinearCurves) -> float:
+    """The lowest free peak in Hz; nan without."""
+    found = linear.free_peaks["right"] or linear.free_peaks["left"]
+    return found[0].frequency if found else math.nan
 
 
 # -- levels ----------------------------------------------------------------------------------------

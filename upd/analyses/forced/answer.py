@@ -68,10 +68,9 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
 
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     """Static state, peaks, the best damper, what the answer depends on most."""
-    numbers = [read_result(one) for one in results]
+    numbers = map(read_result, results)
     known = {(one.name, one.case): one for one in numbers if math.isfinite(one.value)}
-    lost = [one for one in numbers if one.withheld and _is(one, q.PEAK_FREQUENCY)]
-    tables = [_static(known), _peaks(known, len(lost)), _best(known), _modes(known), _inputs(known)]
+    tables = [_static(known), _peaks(known), _best(known), _modes(known), _inputs(known)]
     return [table for table in tables if table.rows]
 
 
@@ -127,7 +126,7 @@ def _static(known: Known) -> AnswerTable:
     )
 
 
-def _peaks(known: Known, lost: int) -> AnswerTable:
+def _peaks(known: Known) -> AnswerTable:
     """One row for every F_C/F_E and mode of the right blade: frequency and height."""
     found = [f for f in known.values() if _is(f, q.PEAK_FREQUENCY) and f.case.kind != "stuck"]
     several = len({f.case.stiffness for f in found}) > 1
@@ -158,14 +157,11 @@ def _peaks(known: Known, lost: int) -> AnswerTable:
         )
         return f"{_height(fold)} at {up.value:.1f}" if fold and up else ""
 
-    note = "Right blade; shares of all contact points and of the cycle."
-    if lost:
-        note += f" {lost} peaks were not reached: see the notes."
     swept = [("# a sweep up reaches", lambda row: reaches(row[0]))]
     return _table(
         "Peaks",
         rows,
-        note,
+        "Right blade; shares of all contact points and of the cycle.",
         ("F_C/F_E", lambda row: case(row[0])),
         ("mode", lambda row: mode(row[0])),
         ("# Hz", lambda row: f"{row[0].value:.1f}"),
@@ -395,8 +391,7 @@ def _performance(group: Group) -> Chart:
     """Peaks of both blades over F_C/F_E."""
     ratio = group["ratio"].data
     traces = [Trace("highest of all", ratio, group["highest_accelerance"].data, "line", 0)]
-    names = [key for key in group if key.startswith("peak_") and key.endswith("_right")]
-    for name in sorted(key for key in names if "accelerance" in key):
+    for name in sorted(key for key in group if key.endswith("_accelerance_right")):
         mode = str(group[name].attributes.get("mode", ""))
         height, colour = group[name].data, len(traces)
         found = np.isfinite(height)

@@ -418,7 +418,7 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
 
 def _points(solution: ForcedSolution, name: str) -> Variables:
     """Where contact points or nodes of whole faces lie, in space and in the frames of their faces;
-    their stiffness and forces at rest, or areas.
+    their stiffness, or areas.
     """
     at, low = "contact_point", "place up the slope, from the lowest point of the face"
     places, model = solution.places(name), solution.models.get(name)
@@ -432,16 +432,7 @@ def _points(solution: ForcedSolution, name: str) -> Variables:
     if model is None:
         return out | {"area": variable(at, places.weight, "mm2")}
     law = model.contacts.law
-    return out | {
-        "k_n": variable(at, law.k_n, "N/mm"),
-        "k_t": variable(at, law.k_t, "N/mm"),
-        "static_force": variable(
-            f"{at} static_component",
-            np.column_stack([law.preload, model.traction]),
-            "N",
-            "before vibration: normal force, then tractions",
-        ),
-    }
+    return out | {"k_n": variable(at, law.k_n, "N/mm"), "k_t": variable(at, law.k_t, "N/mm")}
 
 
 def _curve_arrays(curve: ForcedCurve[Any]) -> Variables:
