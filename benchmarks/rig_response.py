@@ -32,7 +32,7 @@ class Rig:
     def size(self) -> str:
         """Points and unknowns in words."""
         points = self.model.contacts
-        images = " (each with its mirror image)" if self.model.halved else ""
+        images = " (each with its mirror image)" if self.model.damper.n_dof < 6 else ""
         return (
             f"{points.n_point} points{images}, {points.tangents} sliding "
             f"direction{'s' * (points.tangents > 1)}"

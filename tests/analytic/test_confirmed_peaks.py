@@ -61,7 +61,7 @@ def stays(
     model, curve = solution.models["thesis"], solution.curves[0]
     springs = make_springs(solution.plan, model)
     found = peaks.stays(springs, model, curve, steps, x, f)
-    return None if found is None else found.heights
+    return None if found is None else found[0]
 
 
 def test_the_motion_of_a_slipping_peak_stays(slipping: ForcedSolution) -> None:
@@ -174,7 +174,7 @@ def confirm(
         height = float(size[min(int(i), len(size) - 1)]) if i >= 0 else float(size[top])
         stay = (followed or good) if before is not None else good
         heights = np.array([[height, height], [height, 0.99 * height]])
-        return SimpleNamespace(heights=heights) if stay(int(i)) else None
+        return (heights, None) if stay(int(i)) else None
 
     peak = CurvePeak(float(f[top]), float(size[top]), top, 1)
     very_top = Top(float(f[top]), float(size[top]), np.array([-1.0]), True)
@@ -239,8 +239,8 @@ def test_a_motion_is_followed_to_where_it_stays_too(slipping: ForcedSolution) ->
     again = peaks.stays(*given, 3.0 * x[i + 1], float(f[i + 1]), first)
     own = peaks.stays(*given, x[i + 1], float(f[i + 1]))
     assert again is not None and own is not None
-    assert again.heights[1] == pytest.approx(own.heights[1], rel=5e-3)
-    far = first._replace(heights=first.heights * [[1.0], [1.3]])
+    assert again[0][1] == pytest.approx(own[0][1], rel=5e-3)
+    far = first[0] * [[1.0], [1.3]], first[1]
     assert peaks.stays(*given, x[i + 1], float(f[i + 1]), far) is None, "a jump is no growth"
 
 

@@ -151,7 +151,7 @@ def test_a_peak_of_a_whole_curve_is_in_the_harmonic_that_is_read() -> None:
         swept = replace(plan.scene.excitation, start=380.0 / k, stop=480.0 / k)
         mine = replace(plan, scene=replace(plan.scene, excitation=swept))
         model = excited(*(replace(one, harmonic=k) for one in (ONE, OTHER)))
-        found = peaks_at(mine, model, 1e5, 3)
+        found = peaks_at(mine, model, 1e5)
         assert found.arrived
         right = [one for one in found.peaks if one.blade == "right"]
         tops.append([v for one in right for v in (one.height, k * one.frequency)])

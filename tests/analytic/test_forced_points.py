@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upd.analyses.forced.blade_parts import lattice, lattice_points, line_groups, mirror_pairs
+from upd.analyses.forced.blade_parts import lattice, lattice_points, line_groups
 from upd.analyses.forced.measures import path_maxima
 from upd.analyses.forced.statics import StaticState, point_preload
 from upd.errors import InputError
@@ -123,23 +123,36 @@ def test_peaks_of_a_path_whatever_its_direction() -> None:
     assert path_maxima(np.zeros(0), np.zeros(0)) == []
 
 
-def test_mirror_pairs_keep_what_is_even_and_drop_what_is_odd(meshes: dict[str, Mesh]) -> None:
-    # fields that are their own mirror image about y = 0, or its opposite: across the plane the
-    # components along x and z keep their sign and the one along y changes it
-    even = [lambda x, y, z: (x * np.cos(y), np.sin(y), z + y**2)]
-    odd = [lambda x, y, z: (y, 1.0 + z * np.cos(y), x * np.sin(y))]
+def test_points_of_a_half_are_those_of_the_whole_face(meshes: dict[str, Mesh]) -> None:
+    # a field that is its own mirror image about y = 0: only the part along y changes its sign
+    def moved(points: np.ndarray) -> np.ndarray:
+        x, y, z = points.T
+        return np.stack([x * np.cos(y), np.sin(y), z + y**2], axis=1)
+
+    arrangement = "symmetric" if lattice(meshes["left"]).n_column == 11 else "asymmetric"
+    of = {"arrangement": arrangement, "damper": "free", "element_nodes": 20, "symmetry": "half"}
     for side in SIDES:
-        face = lattice_points(meshes[side], "all", 4, side)
-        pairs = mirror_pairs(face)
-        assert pairs is not None
-        assert len(pairs.point) == face.n_point // 2
-        assert np.all(pairs.image != pairs.point), "no point lies on the plane"
-        for fields, sign in ((even, 1.0), (odd, -1.0)):
-            u = np.array([f(*face.position.T) for f in fields])
-            rows = np.einsum("fc,rcm->mfr", face.frame, u)
-            kept, gone = pairs.part(rows, sign), pairs.part(rows, -sign)
-            assert kept == pytest.approx(rows[pairs.point], abs=1e-9)
-            assert gone == pytest.approx(np.zeros_like(rows[pairs.point]), abs=1e-9)
-        # a pair has the stiffness of both
-        assert pairs.total(face.weight) == pytest.approx(2 * face.weight[pairs.point])
-        assert pairs.face(face).weight.sum() == pytest.approx(1.0)
+        n, half = lattice(meshes[side]).n_column, recipes.build_mesh("blade_rig", of)[0][side]
+        for columns in ("all", 1, 2, 3, 4, [0, 1, n - 2, n - 1]):
+            for equal in (False, True):
+                both = [lattice_points(m, 2, columns, side, equal) for m in (meshes[side], half)]
+                whole, found = both
+                groups = whole.line[:, 1].max() + 1
+                kept = whole.line[:, 1] >= groups // 2
+                own = 2 * whole.line[:, 1] == groups - 1
+                weight = (whole.weight * np.where(own, 1.0, 2.0))[kept]
+                assert found.weight == pytest.approx(weight)
+                assert found.position == pytest.approx(whole.position[kept], abs=1e-9)
+                u = [
+                    f.values @ moved(m.points[f.nodes])
+                    for f, m in zip(both, (meshes[side], half), strict=True)
+                ]
+                # of a mean across the plane the parts along y cancel: the model drops them
+                u[1][own[kept], 1] = 0.0
+                assert u[1] == pytest.approx(u[0][kept], abs=1e-9)
+
+
+def test_columns_of_a_half_are_their_own_mirror_image() -> None:
+    half = recipes.build_mesh("blade_rig", {"damper": "free", "symmetry": "half"})[0]
+    with pytest.raises(InputError, match=r'own mirror image.*mesh\.symmetry = "full"'):
+        lattice_points(half["left"], "all", [0, 1], "left")

@@ -16,7 +16,6 @@ from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
-    seated_start,
     worn_start,
 )
 from upd.analyses.seated.bodies import Bodies, lattice, make_bodies
@@ -162,7 +161,8 @@ def test_misfit_of_what_is_no_answer() -> None:
 def test_nothing_moves_without_excitation(traction: float | str) -> None:
     if traction == "seated":
         model, found = made(), rig()[2].seat(MU, F_C * np.linspace(0.1, 1.0, 10))
-        start = seated_start(model, found)
+        last = found.history
+        start = resting(model, last.force, last.slip, last.gap, last.motion)
     else:
         model, start = worn(float(traction))
     march, at = InterfaceMarch(model, 300.0, [0.0], 64, by_coulomb), start.copy()
@@ -749,9 +749,9 @@ def test_too_few_periods_are_told() -> None:
 
 def test_a_state_of_other_faces_is_refused() -> None:
     model, _ = worn()
-    found = rig()[2].seat(MU, [F_C])
+    last = rig()[2].seat(MU, [F_C]).history
     with pytest.raises(InputError, match="another contact"):
-        seated_start(model, found)
+        resting(model, last.force, last.slip, last.gap, last.motion)
     with pytest.raises(InputError, match="positive"):
         stepped_sine(model, [0.0], [1.0], worn()[1])
     with pytest.raises(InputError, match="8 samples"):

@@ -19,14 +19,10 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.performance import (
     Performance,
     RatioPoint,
-    beside_best,
-    further_points,
-    harmonics_of,
     of_curve,
     peaks_at,
     performance_of,
     ratios_of,
-    with_curves,
 )
 from upd.analyses.forced.solve import ForcedSolution
 from upd.progress import Stages, silent
@@ -56,9 +52,9 @@ def solved(ratio: float) -> ForcedSolution:
     return found  # type: ignore[no-any-return]
 
 
-def at(ratio: float, harmonics: int = 3) -> RatioPoint:
+def at(ratio: float) -> RatioPoint:
     s = solved(1e5)
-    return peaks_at(s.plan, s.models["thesis"], ratio, harmonics)
+    return peaks_at(s.plan, s.models["thesis"], ratio)
 
 
 def test_where_all_sticks_the_peaks_are_the_stuck_ones() -> None:
@@ -74,7 +70,6 @@ def test_where_all_sticks_the_peaks_are_the_stuck_ones() -> None:
     worst = max(
         p.height for side in ("left", "right") for p in solution.linear["thesis"].stuck_peaks[side]
     )  # type: ignore[arg-type]
-    assert found.worst is not None
     assert found.worst.height == pytest.approx(worst, rel=5e-3)
 
 
@@ -143,9 +138,9 @@ def test_the_best_is_where_the_highest_of_all_peaks_is_lowest() -> None:
     two = [point(1.0, 5.0, 2.0), point(2.0, 3.0, 4.0), point(4.0, 1.0, 6.0)]
     found = Performance(tuple(two), 300.0, 190.0)
     assert found.best is two[1] and found.inside
-    assert found.best.worst is not None and found.best.worst.height == 4.0
+    assert found.best.worst.height == 4.0
     left = point(3.0, 1.0)._replace(peaks=(peak(1.0), peak(7.0, "left")))
-    assert left.worst is not None and left.worst.blade == "left"
+    assert left.worst.blade == "left"
 
 
 def test_a_best_at_an_end_is_not_inside() -> None:
@@ -173,55 +168,36 @@ def test_a_factor_of_two_is_read_on_logarithmic_axes() -> None:
 
 
 def test_two_more_lie_between_the_best_and_its_neighbours() -> None:
-    assert beside_best(V_SHAPE[::-1]) == pytest.approx([math.sqrt(1000.0), math.sqrt(1e5)])
-    assert beside_best(V_SHAPE[:3]) == pytest.approx([math.sqrt(1000.0)])
-    assert beside_best(V_SHAPE[:2]) == []
+    def beside(*points: RatioPoint) -> list[float]:
+        return Performance(points, 300.0, 190.0).beside_best()
+
+    assert beside(*V_SHAPE) == pytest.approx([math.sqrt(1000.0), math.sqrt(1e5)])
+    assert beside(*V_SHAPE[:3]) == pytest.approx([math.sqrt(1000.0)])
+    assert beside(*V_SHAPE[:2]) == []
     lost = point(30.0, 0.1, arrived=False)
-    assert beside_best([*V_SHAPE, lost]) == beside_best(V_SHAPE)
+    assert beside(*V_SHAPE[:2], lost, *V_SHAPE[2:]) == beside(*V_SHAPE)
 
 
-def test_the_curve_has_the_runs_own_points_once_and_two_beside_the_best() -> None:
+def test_the_curve_has_the_runs_own_points_once() -> None:
     solution = solved(250.0)
     (curve,) = solution.curves
-    before = [point(25.0, 300.0), point(250.0 * (1.0 + 1e-9), 1.0), point(2500.0, 310.0)]
-    plan, model = solution.plan, solution.models["thesis"]
-    first = with_curves(before, [curve])
-    balance = replace(plan.scene.balance, harmonics=9)
-    choice = replace(plan.scene.performance, harmonics=3)
-    more = replace(plan, scene=replace(plan.scene, balance=balance, performance=choice))
-    jobs = further_points(more, model, first, before)
-    assert all(function is peaks_at for function, _ in jobs)
-    assert [arguments[3] for _, arguments in jobs] == [3, 3, 9], "the run's harmonics at the best"
-    asked = [arguments[2] for _, arguments in jobs]
-    middle = math.sqrt(25.0 * 250.0)
-    assert asked == pytest.approx([middle, math.sqrt(250.0 * 2500.0), 250.0])
-    further = [point(middle, 99.0), point(250.0, 1.01)]
-    found = performance_of(solution.linear["thesis"], first, further)
-    assert found.again == (first[-1], further[1])
-    ratios = [one.ratio for one in found.points]
-    assert ratios == pytest.approx([25.0, middle, 250.0, 2500.0])
-    assert found.points[2].peaks == of_curve(curve).peaks, "its own point stands"
-    assert found.best is found.points[1]
-    assert found.stuck == max(p.height for s in solution.linear["thesis"].stuck_peaks.values()
-                              for p in s)  # fmt: skip
+    points = [point(2500.0, 310.0), point(25.0, 300.0), point(250.0 * (1.0 + 1e-9), 1.0)]
+    linear = solution.linear["thesis"]
+    found = performance_of(linear, points, [curve])
+    assert [one.ratio for one in found.points] == pytest.approx([25.0, 250.0, 2500.0])
+    assert found.points[1].peaks == of_curve(curve).peaks, "its own point stands"
+    early = replace(curve, answer=replace(curve.answer, status="stopped"))
+    assert performance_of(linear, points, [early]).points[1] is points[2], "unless it ends early"
+    assert len(performance_of(linear, points[:2], [early]).points) == 3
+    assert found.stuck == max(p.height for s in linear.stuck_peaks.values() for p in s)
     assert math.isnan(found.free), "no free peak between 400 and 460 Hz"
 
 
-def test_ratios_and_harmonics_are_the_scenes() -> None:
+def test_ratios_are_the_scenes() -> None:
     plan = solved(1e5).plan
-    choice = replace(plan.scene.performance, lowest=2.0, highest=200.0, points=3, harmonics=None)
-
-    def scene(**values: Any) -> Any:
-        return replace(plan, scene=replace(plan.scene, performance=choice, **values))
-
-    assert ratios_of(scene()) == pytest.approx([2.0, 20.0, 200.0])
-    assert harmonics_of(scene()) == 3
-    choice = replace(choice, harmonics=1)
-    assert harmonics_of(scene()) == 1
-    forces = replace(
-        plan.scene.excitation, forces=(replace(plan.scene.excitation.forces[0], harmonic=2),)
-    )
-    assert harmonics_of(scene(excitation=forces)) == 2, "what is excited is carried"
+    choice = replace(plan.scene.performance, lowest=2.0, highest=200.0, points=3)
+    scene = replace(plan, scene=replace(plan.scene, performance=choice))
+    assert ratios_of(scene) == pytest.approx([2.0, 20.0, 200.0])
 
 
 def test_a_run_finds_the_best_ratio_and_tells_it() -> None:
@@ -239,12 +215,10 @@ def test_a_run_finds_the_best_ratio_and_tells_it() -> None:
     assert len(found.points) == 4 + (2 if found.inside else 1)
     assert (np.diff([one.ratio for one in found.points]) > 0.0).all()
     results = {r.name: r for r in forced.ANALYSIS.make_results(solution)}
-    assert found.best is not None and found.best.worst is not None
+    assert found.best is not None
     assert results["best_ratio"].value == found.best.ratio
     assert results["best_peak"].value == found.best.worst.height
     assert results["best_peak"].case.blade == found.best.worst.blade
     assert results["best_inside"].value == float(found.inside)
     arrays = forced.ANALYSIS.arrays(solution)["performance thesis"]
-    assert arrays["highest_accelerance"][1].tolist() == [
-        one.worst.height for one in found.known if one.worst is not None
-    ]
+    assert arrays["highest_accelerance"][1].tolist() == [one.worst.height for one in found.known]

@@ -15,7 +15,8 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, replace
-from typing import Literal, NamedTuple, TypeVar
+from functools import cache, partial
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import Limit, Top, fine_grid, point_limit, stuck_frequency
 from upd.analyses.forced.measures import CANDIDATES, CurvePeak, numbered_peaks
-from upd.analyses.forced.model import Model, balance_of, make_model, quiet, respond
+from upd.analyses.forced.model import Model, make_model, quiet, respond
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import face_laws
@@ -44,7 +45,7 @@ from upd.fitting.targets import (
 )
 from upd.hbm import FrequencyResponse
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.sweep import first_point, newton, place_sliders
+from upd.hbm.springs.sweep import first_point, newton
 from upd.linalg.parallel import threads_for
 from upd.mesh import recipes
 from upd.progress import Stages
@@ -152,20 +153,13 @@ class ModelSource:
         scene = self.bare(fitted_scene(self.scene, self.parameters, z))
         return face_laws(scene.stiffnesses[self.stiffness], self._stages)
 
-    def directions(self, z: Array) -> str:
-        """What contact.directions has to say in the scene with these parameters to give these
-        numbers; "" where its own word does.
+    @property
+    def directions(self) -> str:
+        """What contact.directions has to say in a fitted scene to give its numbers: those chosen
+        first; "" where the scene's own word does.
         """
-        scene = fitted_scene(self.scene, self.parameters, z)
-        if scene.contact.directions != "auto":
-            return ""
-        used = self.at(z)[1].contacts.tangents
-        kept, self._tangents = self._tangents, None
-        self._models.clear()
-        chosen = self.at(z)[1].contacts.tangents
-        self._tangents = kept
-        self._models.clear()
-        return "" if used == chosen else _DIRECTIONS[used]
+        auto = self.scene.contact.directions == "auto"
+        return _DIRECTIONS[self._tangents] if auto and self._tangents is not None else ""
 
     def bare(self, scene: ForcedScene) -> ForcedScene:
         """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
@@ -200,7 +194,7 @@ class ModelSource:
         model = _remembered(self._models, frame, lambda: model)
         if self._tangents is None and scene.contact.directions == "auto":
             # once chosen they stay: numbers would jump
-            self._tangents = model.contacts.tangents if model.halved else None
+            self._tangents = model.contacts.tangents if bodies.half else None
         return plan, model
 
     def _frame(self, scene: ForcedScene) -> str:
@@ -298,131 +292,84 @@ def _told(peak: Top | CurvePeak, what: str) -> float:
     return float(peak.frequency if what == "frequency" else peak.height)
 
 
-class LimitNumbers:
-    """Numbers of one model's linear limits; what several of them need is found once.
+def _of_limits(
+    plan: ForcedPlan,
+    of: str,
+    limit: Callable[[bool], Limit],
+    peaks: Callable[[bool, Side], list[CurvePeak]],
+) -> float:
+    """A number of one model's linear limits.
 
     Parameters
     ----------
-    plan, model
-        Of the rig.
+    of
+        Its name.
+    limit, peaks
+        Whether stuck -> the limit; whether stuck and blade -> its peaks.
+
+    Raises
+    ------
+    ConvergenceError
+        Where it is not among the numbers.
     """
-
-    def __init__(self, plan: ForcedPlan, model: Model) -> None:
-        self.plan, self.model = plan, model
-        self._limits: dict[bool, Limit] = {}
-        self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
-
-    def limit(self, stuck: bool) -> Limit:
-        """Free or stuck."""
-        if stuck not in self._limits:
-            self._limits[stuck] = point_limit(self.plan, self.model, stuck)
-        return self._limits[stuck]
-
-    def __call__(self, of: str) -> float:
-        """A number.
-
-        Raises
-        ------
-        ConvergenceError
-            Where it is not among the numbers.
-        """
-        e = self.plan.scene.excitation
-        if of in STUCK_MODES:
-            shapes = self.limit(True).shapes
-            found = stuck_frequency(shapes.modes if shapes else (), of == "stuck_in_phase")
-            if math.isnan(found):
-                raise ConvergenceError(
-                    f"{of}: no such mode below {CANDIDATES * e.stop:g} Hz, {CANDIDATES:g} times "
-                    "excitation.stop"
-                )
-            return found
-        kind, side, number, what = PEAK_NUMBERS[of]
-        if (kind, side) not in self._peaks:
-            self._peaks[kind, side] = self.limit(kind == "stuck").peaks(side, grid(self.plan))
-        peak = next((p for p in self._peaks[kind, side] if p.number == number), None)
-        if peak is None:
+    e = plan.scene.excitation
+    if of in STUCK_MODES:
+        shapes = limit(True).shapes
+        found = stuck_frequency(shapes.modes if shapes else (), of == "stuck_in_phase")
+        if math.isnan(found):
             raise ConvergenceError(
-                f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
+                f"{of}: no such mode below {CANDIDATES * e.stop:g} Hz, {CANDIDATES:g} times "
+                "excitation.stop"
             )
-        return _told(peak, what)
+        return found
+    kind, side, number, what = PEAK_NUMBERS[of]
+    peak = next((p for p in peaks(kind == "stuck", side) if p.number == number), None)
+    if peak is None:
+        raise ConvergenceError(
+            f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
+        )
+    return _told(peak, what)
 
 
-class CurveWithFriction(NamedTuple):
-    """What a fit needs at one F_C/F_E.
+def _with_friction(
+    plan: ForcedPlan, model: Model, ratio: float, keys: Sequence[PeakKey], over: Array
+) -> tuple[dict[PeakKey, Top | ConvergenceError], dict[Side, ComplexArray]]:
+    """What targets need at one F_C/F_E: peaks, or why they were not found, and the accelerance of
+    both blades at frequencies (k,) in Hz.
 
-    Attributes
-    ----------
-    ratio
-        F_C/F_E.
-    peaks
-        Which peaks.
-    frequencies
-        (k,) Hz at which both blades' accelerance is, rising; empty without a curve.
+    Raises
+    ------
+    ConvergenceError
+        Where a point of the curve is not found.
     """
-
-    ratio: float
-    peaks: Sequence[PeakKey]
-    frequencies: Array
-
-    def at(
-        self, plan: ForcedPlan, model: Model
-    ) -> tuple[dict[PeakKey, Top | ConvergenceError], dict[Side, ComplexArray]]:
-        """Peaks, or why they were not found, and the curves of both blades.
-
-        Raises
-        ------
-        ConvergenceError
-            Where a point of the curve is not found.
-        """
-        force, over = plan.scene.damper.centrifugal / self.ratio, self.frequencies
-        b = place_sliders(balance_of(plan, model, force), plan.scene.excitation.start)
-        if b is None:
-            raise ConvergenceError(
-                f"F_C/F_E {self.ratio:g}: the static loads alone have no solution; to fix it: "
-                'balance.slider = "zero"'
-            )
-        if self.peaks:
-            # as fine as its peaks need
-            over = np.unique(np.concatenate([fine_grid(plan, model), over]))
-        answer = respond(plan, model, force, over)
-        tops: dict[PeakKey, Top | ConvergenceError] = {}
-        for key in self.peaks:
-            try:
-                tops[key] = self._top(plan, model, b, answer, key)
-            except ConvergenceError as error:
-                tops[key] = error
-        if not len(self.frequencies):
-            return tops, {}
-        x = np.array([self._point(b, answer, float(f)) for f in self.frequencies])
-        return tops, measures.accelerance_at(model, b, x, self.frequencies, force)
-
-    def _point(self, b: Balance, answer: FrequencyResponse, f: float) -> Array:
-        here = np.flatnonzero(np.abs(answer.frequency / f - 1.0) <= _SAME)
-        x = newton(b, answer.x[here[0]], f) if len(here) else first_point(b, f)
-        if x is None:
-            raise ConvergenceError(
-                f"F_C/F_E {self.ratio:g}: no motion at {f:.6g} Hz ({answer.message})"
-            )
-        return x
-
-    def _top(
-        self, plan: ForcedPlan, model: Model, b: Balance, answer: FrequencyResponse, key: PeakKey
-    ) -> Top:
-        """A peak between the points of the curve."""
-        side, number = key
-        name = f"{'left_' * (side == 'left')}peak_{number}@{self.ratio:g}"
-        force = plan.scene.damper.centrifugal / self.ratio
+    force, tops = plan.scene.damper.centrifugal / ratio, dict[PeakKey, Top | ConvergenceError]()
+    # as fine as its peaks need
+    fine = np.unique(np.concatenate([fine_grid(plan, model), over])) if keys else over
+    answer = respond(plan, model, force, fine)
+    b = answer.balance
+    for side, number in keys:
         height = np.abs(measures.accelerance(answer, model.row(side), force))
         peaks = numbered_peaks(model, answer, height, plan.scene.excitation.stop)
-        peak = next((one for one in peaks if one.number == number), None)
-        if peak is None:
-            raise ConvergenceError(f"{name}: no such peak on the curve ({answer.message})")
-        f = float(answer.frequency[peak.sample])
-        x = newton(b, answer.x[peak.sample], f)
-        top = None if x is None else climbed(model, b, x, f, side, force)
-        if top is None:
-            raise ConvergenceError(f"{name}: the peak at {peak.frequency:.6g} Hz was not climbed")
-        return top
+        peak, top = next((one for one in peaks if one.number == number), None), None
+        why = f"no such peak on the curve ({answer.message})"
+        if peak is not None:
+            x, f = answer.x[peak.sample], float(answer.frequency[peak.sample])
+            top, why = climbed(model, b, x, f, side, force), f"its top near {f:.6g} Hz not reached"
+        name = f"{'left_' * (side == 'left')}peak_{number}@{ratio:g}"
+        tops[side, number] = top or ConvergenceError(f"{name}: {why}")
+    if not len(over):
+        return tops, {}
+    x = np.array([_point(b, answer, ratio, float(f)) for f in over])
+    return tops, measures.accelerance_at(model, b, x, over, force)
+
+
+def _point(b: Balance, answer: FrequencyResponse, ratio: float, f: float) -> Array:
+    """The unknowns at one frequency."""
+    here = np.flatnonzero(np.abs(answer.frequency / f - 1.0) <= _SAME)
+    x = newton(b, answer.x[here[0]], f) if len(here) else first_point(b, f)
+    if x is None:
+        raise ConvergenceError(f"F_C/F_E {ratio:g}: no motion at {f:.6g} Hz ({answer.message})")
+    return x
 
 
 class FitResponses:
@@ -469,7 +416,8 @@ class FitResponses:
         for line in () if journal is None else journal.lines:
             z, value, slope = (np.array(one, float) for one in line)
             self._found[z.tobytes()] = value, slope.reshape(len(value), len(z))
-        self.friction = [_curve_at(ratio, targets) for ratio in targets.ratios]
+        #: F_C/F_E -> peaks, and Hz at which the accelerance is asked for
+        self.friction = {ratio: _asked(ratio, targets) for ratio in targets.ratios}
 
     def at(self, z: Array) -> tuple[Array, Array]:
         """The numbers, then the points of the curves, and their derivatives.
@@ -527,16 +475,20 @@ class FitResponses:
         with threads_for(len(model.M)):
             # what the balance leaves out is alike on every curve of a fit
             with quiet() if self._solved_once else nullcontext():
-                friction = {one.ratio: one.at(plan, model) for one in self.friction}
+                friction = {
+                    ratio: _with_friction(plan, model, ratio, *asked)
+                    for ratio, asked in self.friction.items()
+                }
             self._solved_once = True
-            limits = LimitNumbers(plan, model)
+            limit = cache(partial(point_limit, plan, model))
+            peaks = cache(lambda stuck, side: limit(stuck).peaks(side, grid(plan)))
             for one in self.targets.numbers:
                 try:
                     if one.of in CONTACT_TOTALS:
                         side, which = CONTACT_TOTALS[one.of]
                         v = float(getattr(self.source.totals(z)[side], which))
                     elif one.ratio is None:
-                        v = limits(one.of)
+                        v = _of_limits(plan, one.of, limit, peaks)
                     else:
                         _, side, number, what = PEAK_NUMBERS[one.of]
                         peak = friction[one.ratio][0][side, number]
@@ -551,25 +503,19 @@ class FitResponses:
             for curve in self.targets.curves:
                 of = curve.curve
                 if of.force_ratio is None:
-                    H = limits.limit(of.state == "stuck").accelerance(of.blade, of.frequency)
+                    H = limit(of.state == "stuck").accelerance(of.blade, of.frequency)
                 else:
-                    over = next(c.frequencies for c in self.friction if c.ratio == of.force_ratio)
-                    at = np.searchsorted(over, of.frequency)
+                    at = np.searchsorted(self.friction[of.force_ratio][1], of.frequency)
                     H = friction[of.force_ratio][1][of.blade][at]
                 parts.append(_in_parts(curve, H))
         return np.concatenate(parts)
 
 
-def _curve_at(ratio: float, targets: Targets) -> CurveWithFriction:
-    """What targets need of one F_C/F_E."""
-    peaks: dict[PeakKey, None] = {}
-    for one in targets.numbers:
-        if one.ratio == ratio:
-            _, side, number, _ = PEAK_NUMBERS[one.of]
-            peaks[side, number] = None
+def _asked(ratio: float, targets: Targets) -> tuple[list[PeakKey], Array]:
+    """Peaks and frequencies (k,), rising, that targets need of one F_C/F_E."""
+    keys = dict.fromkeys(PEAK_NUMBERS[one.of][1:3] for one in targets.numbers if one.ratio == ratio)
     over = [one.curve.frequency for one in targets.curves if one.curve.force_ratio == ratio]
-    frequencies = np.unique(np.concatenate(over)) if over else np.zeros(0)
-    return CurveWithFriction(ratio, list(peaks), frequencies)
+    return list(keys), np.unique(np.concatenate(over)) if over else np.zeros(0)
 
 
 def _in_parts(target: CurveTarget, H: ComplexArray) -> Array:

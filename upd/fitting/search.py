@@ -168,7 +168,7 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         ends,
         further,
         done,
-        responses.source.directions(best),
+        responses.source.directions,
         responses.source.made,
         math.nan,
     )

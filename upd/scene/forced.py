@@ -190,15 +190,11 @@ class PerformanceChoice(Table):
         First and last F_C/F_E.
     points
         F_C/F_E of the curve; two more are solved beside the best. Cost: a whole curve each.
-    harmonics
-        The highest of its curves; that of the balance when none. Cost: fewer save most where much
-        slips.
     """
 
     lowest: q.Ratio = 5.0
     highest: q.Ratio = 1000.0
     points: Annotated[int, q.at_least(3)] = 12
-    harmonics: HarmonicNumber | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

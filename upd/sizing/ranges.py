@@ -330,7 +330,7 @@ class RigPeaks:
         ratio = math.exp(s)
         self._report(f"whole curve, F_C/F_E {ratio:.4g}")
         self.curves += 1
-        found = peaks_at(self.plan, self.model, ratio, self.scene.balance.harmonics)
+        found = peaks_at(self.plan, self.model, ratio)
         if not found.arrived:
             return None
         return {

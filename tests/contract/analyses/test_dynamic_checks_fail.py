@@ -13,12 +13,13 @@ import pytest
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import both_ways
-from upd.analyses.forced.interface_model import make_springs
+from upd.analyses.forced.interface_model import by_coulomb, make_springs
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
-from upd.analyses.forced.solve import ForcedSolution, marched_peak
+from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.modal.solve import ModalSolution
+from upd.hbm.faces.sweep import period_of_sweep
 from upd.progress import Stages, silent
 from upd.results import Check
 from upd.scene import load_scene
@@ -76,7 +77,11 @@ def _add_sweeps(solution: ForcedSolution, f: float) -> None:
     start = springs.at_rest()
     solution.curves += both_ways(beside, "thesis", curve.ratio, springs.march, start)
     sweep = solution.curves[1]
-    solution.marched = [marched_peak(solution, sweep, sweep.peaks["right"][0])]
+    periods = {
+        top.number: period_of_sweep(sweep.answer, top.sample, by_coulomb)
+        for top in sweep.peaks["right"]
+    }
+    solution.curves[1] = replace(sweep, periods=periods)
 
 
 @pytest.fixture(scope="module")
@@ -280,7 +285,7 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     none = RatioPoint(250.0, (), True)
     performance = replace(response.performances["thesis"], points=(none,))
     bare = replace(part.curves[0], peaks={"left": (), "right": ()}, tops={}, checked=(), folds=())
-    part = replace(part, curves=[bare], marched=[])
+    part = replace(part, curves=[bare])
     part = replace(part, performances={"thesis": performance})
     cut = with_answer(part, status="stopped", message="lost")
     results = [r for r in forced.ANALYSIS.make_results(cut) if r.withheld]

@@ -20,11 +20,11 @@ The integrals run over fixed parts of the face, not over nodes: finer elements c
 they change of u. The displacement at a node, or the mean over a line of nodes, has no limit there:
 a force on a point moves it by 1/h and one on a line by log h of the element size h.
 
-Of rigs that are symmetric about the mid-plane y = 0 blades are reduced to even motion, in which a
-contact point and its mirror image move as one: it halves the unknowns. Rig, excitation and
-accelerometers are their own mirror images, so the answer may be taken even: normal and slope
-displacements of a pair are equal, those along y opposite. Motions that are odd about the plane, the
-damper's drift along y among them, are left out; friction in gross slip would not hold such a drift.
+Half meshes y >= 0 move evenly about their mid-plane, and a contact point stands for itself and its
+mirror image: it halves the unknowns. Rig, excitation and accelerometers are their own mirror
+images, so the answer may be taken even: normal and slope displacements of a pair are equal, those
+along y opposite. Motions that are odd about the plane, the damper's drift along y among them, are
+left out; friction in gross slip would not hold such a drift.
 
 References
 ----------
@@ -37,7 +37,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -45,7 +45,6 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.seated.bodies import Blade, Bodies, is_half, lattice, patch_frame
@@ -134,23 +133,20 @@ def line_groups(choice: Any, count: int, where: str) -> FloatArray:
         )
     if wanted:
         return lines[wanted]
-    n, share = int(choice), np.zeros((int(choice), count))
-    for line in range(count):
-        # in whole numbers: group k holds k / n <= line / (count - 1) <= (k + 1) / n
-        place, rest = divmod(line * n, count - 1) if count > 1 else (0, 1)
-        on = (
-            {min(place, n - 1), max(place - 1, 0)}
-            if rest == 0 and 0 < place < n
-            else {min(place, n - 1)}
-        )
-        share[list(on), line] = 1.0 / len(on)
-    return share
+    # in whole numbers: group k holds k / n <= line / (count - 1) <= (k + 1) / n
+    n = int(choice)
+    place = np.arange(count) * n - np.arange(n)[:, None] * (count - 1)
+    on = (place >= 0) & (place <= count - 1)
+    return np.asarray(on / on.sum(axis=0))
 
 
 def lattice_points(
     mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool = False
 ) -> FacePoints:
     """Points at the chosen rows and columns of the patch's lattice, or means over groups of them.
+
+    Of a half y >= 0 the lines are those of the whole face: a point there stands for its mirror
+    image too, a mean across the plane for itself.
 
     Parameters
     ----------
@@ -162,12 +158,18 @@ def lattice_points(
     Raises
     ------
     InputError
-        When the lattice has fewer lines.
+        When the lattice has fewer lines, and for columns of a half that are not their own mirror
+        images.
     """
-    found = lattice(mesh)
+    found, half = lattice(mesh), is_half(mesh)
     up = line_groups(rows, found.n_row, f"contact.rows, {side} face")
-    along = line_groups(columns, found.n_column, f"contact.columns, {side} face")
-    size = np.ones(len(found.nodes)) if equal else found.area
+    where = f"contact.columns, {side} face"
+    on_plane = np.isin(found.nodes, mesh.nodes["plane_y"] if half else ())
+    if half:
+        along, own = _folded(columns, found.n_column, bool(on_plane.any()), where)
+    else:
+        along, own = line_groups(columns, found.n_column, where), False
+    size = np.ones(len(found.nodes)) if equal else found.area * np.where(on_plane, 2.0, 1.0)
     share = (up[:, None, found.row] * along[None, :, found.column] * size).reshape(
         len(up) * len(along), -1
     )
@@ -177,12 +179,30 @@ def lattice_points(
     if len(used) == len(share) and np.count_nonzero(share) == len(share):
         # every point is a node: in the order of the points
         nodes, values = found.nodes[share.argmax(axis=1)], np.eye(len(share))
-    lines = np.column_stack(
-        [np.repeat(np.arange(len(up)), len(along)), np.tile(np.arange(len(along)), len(up))]
-    )
-    return FacePoints(
-        values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values, lines
-    )
+    lines = np.column_stack(np.divmod(np.arange(len(share)), len(along)))
+    position = values @ mesh.points[nodes]
+    if own:
+        position[lines[:, 1] == 0, 1] = 0.0
+        total[lines[:, 1] == 0] *= 0.5
+    return FacePoints(position, found.frame, total / total.sum(), nodes, values, lines)
+
+
+def _folded(choice: Any, count: int, on_plane: bool, where: str) -> tuple[FloatArray, bool]:
+    """Share of each column of a half in the groups of the whole face that are kept, y >= 0, and
+    whether the first of these is its own mirror image.
+    """
+    share = line_groups(choice, 2 * count - on_plane, where)
+    if not np.array_equal(share, share[::-1, ::-1]):
+        raise InputError(
+            f"{where}: {choice!r} is not its own mirror image about y = 0; to fix it: "
+            'mesh.symmetry = "full"'
+        )
+    images = share[:, :count][:, ::-1].copy()
+    if on_plane:
+        # its own image
+        images[:, 0] = 0.0
+    n = len(share)
+    return (share[:, -count:] + images)[n // 2 :], n % 2 == 1
 
 
 _HALF = float(np.finfo(float).eps) ** 0.5
@@ -247,12 +267,8 @@ def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
     found = [_rectangle(mesh.points, faces[part], frame, rows, count, side) for part in parts]
     weight = np.concatenate([w for w, _ in found])
     values = np.vstack([v for _, v in found])[:, nodes] / weight[:, None]
-    line = [
-        np.column_stack(
-            [np.repeat(np.arange(rows), count), np.tile(np.arange(count), rows) + k * count]
-        )
-        for k in range(len(parts))
-    ]
+    row, column = np.divmod(np.arange(rows * count), count)
+    line = [np.column_stack([row, column + k * count]) for k in range(len(parts))]
     return FacePoints(
         values @ mesh.points[nodes],
         frame,
@@ -313,88 +329,6 @@ def _rectangle(
 # -- a blade on its points -------------------------------------------------------------------------
 
 
-#: damper dofs that are even about y = 0: ux, uz and the rotation about y
-EVEN_DOFS = (0, 2, 4)
-#: signs of the mirror image's displacement: normal, along the damper, up the slope
-MIRROR_SIGNS = np.array([1.0, -1.0, 1.0])
-#: share of odd motion below which a mode counts as even, above one minus which as odd
-PARITY = 1e-4
-
-
-@dataclass(frozen=True)
-class MirrorPairs:
-    """Points (m,) kept of a face, y >= 0, and their mirror images (m,), themselves on the plane."""
-
-    point: IntArray
-    image: IntArray
-
-    def part(self, rows: FloatArray, sign: float = 1.0) -> FloatArray:
-        """Rows (n, 3, r) of all points -> (m, 3, r) even part of the displacement of the points
-        kept; the odd one with sign -1.
-        """
-        image = sign * MIRROR_SIGNS[:, None] * rows[self.image]
-        return np.asarray(0.5 * (rows[self.point] + image))
-
-    def total(self, values: FloatArray) -> FloatArray:
-        """Values (n,) of all points -> (m,) of each pair together, a point on the plane by
-        itself.
-        """
-        return np.asarray(
-            values[self.point] + np.where(self.image != self.point, values[self.image], 0.0)
-        )
-
-    def face(self, face: FacePoints) -> FacePoints:
-        """The points kept, with the weight of their pairs."""
-        position = face.position[self.point].copy()
-        position[self.image == self.point, 1] = 0.0
-        return FacePoints(
-            position,
-            face.frame,
-            self.total(face.weight),
-            face.nodes,
-            face.values[self.point],
-            face.line[self.point],
-        )
-
-
-def mirror_pairs(face: FacePoints) -> MirrorPairs | None:
-    """The pairs of a face's points, None unless every point has its mirror image with the same
-    share of the stiffness.
-    """
-    x = face.position
-    size = float(np.ptp(x, axis=0).max())
-    distance, image = cKDTree(x).query(x * np.array([1.0, -1.0, 1.0]))
-    image = np.asarray(image, np.int64)
-    alike = np.abs(face.weight - face.weight[image]) <= _HALF * face.weight.max()
-    if (
-        (distance > _HALF * size).any()
-        or not alike.all()
-        or not np.array_equal(image[image], np.arange(len(x)))
-    ):
-        return None
-    kept = np.flatnonzero((image == np.arange(len(x))) | (x[:, 1] > 0.0))
-    return MirrorPairs(kept, image[kept])
-
-
-def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> FloatArray | None:
-    """Of mode shapes (r, k) those that are even about y = 0 at the contact points; None when one is
-    neither even nor odd: its pair of equal frequencies is mixed.
-
-    Parameters
-    ----------
-    rows
-        (n, 3, r) displacement of all points of the coordinates.
-    """
-    even, odd = (
-        np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0)
-        for part in (pairs.part(rows), pairs.part(rows, -1.0))
-    )
-    share = odd / np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
-    if ((share > PARITY) & (share < np.sqrt(1.0 - PARITY**2))).any():
-        return None
-    return np.asarray(shapes[:, share <= PARITY])
-
-
 #: modes of the whole blade beside the ones kept, of those that points off the nodes are put on
 _BESIDE = 6
 
@@ -424,30 +358,13 @@ class BladePart:
 
 def reduced_blades(
     plan: ForcedPlan, bodies: Bodies
-) -> tuple[Mapping[Side, FacePoints], list[BladePart], Mapping[Side, MirrorPairs] | None]:
-    """Points of whole faces, each blade on what its points and probes see; pairs of the points
-    where only motion even about y = 0 is kept.
-    """
+) -> tuple[Mapping[Side, FacePoints], list[BladePart]]:
+    """Points of both faces, each blade on what its points and probes see."""
     faces = {side: _face(plan.scene, bodies, side) for side in SIDES}
     parts = in_parallel(
         [partial(_reduced, plan.scene, bodies, side, faces[side]) for side in SIDES], plan.workers
     )
-    half = plan.symmetry == "half" and not bodies.half
-    pairs: dict[Side, MirrorPairs] = {}
-    small: list[BladePart] = []
-    for side, part in zip(SIDES, parts, strict=True) if half else ():
-        mine = mirror_pairs(faces[side])
-        even = None if mine is None else even_modes(part.rows, mine, _lowest(part))
-        if mine is not None and even is not None:
-            pairs[side] = mine
-            small.append(ritz(part, even, mine.part(part.rows)))
-    if len(pairs) == len(SIDES):
-        return faces, small, pairs
-    whole = [
-        part if faces[side].at_nodes else ritz(part, _lowest(part), part.rows)
-        for side, part in zip(SIDES, parts, strict=True)
-    ]
-    return faces, whole, None
+    return faces, parts
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
@@ -460,12 +377,19 @@ def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
 def _reduced(scene: ForcedScene, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
     """One blade on what its points and probes see: its accelerometer, and where it is excited the
     node of its force.
+
+    A half blade has half of the energy, and its points stand for themselves and their mirror
+    images: K and M of the whole are twice its own.
     """
     excited = side in excitation_of(scene.excitation).blades
     names = ("accelerometer", "force") if excited else ("accelerometer",)
+    twice = 1.0 + bodies.half
     if scene.contact.rule == GAUSS:
-        return _attached(scene, bodies, side, names)
-    return _nodal(scene, bodies, side, face, names)
+        part = _attached(scene, bodies, side, names)
+    else:
+        part = _nodal(scene, bodies, side, face, names)
+    part = replace(part, K=twice * part.K, M=twice * part.M)
+    return part if face.at_nodes else ritz(part)
 
 
 def _nodal(
@@ -478,7 +402,10 @@ def _nodal(
     count = scene.reduction.modes
     blade = bodies.blades[side]
     probes = [blade.probe(name) for name in names]
-    boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
+    dofs = (3 * face.nodes[:, None] + np.arange(3)).ravel()
+    moves = np.isin(dofs, blade.free)
+    places = np.searchsorted(blade.free, dofs[moves])
+    boundary = np.unique(np.concatenate([places, probes]))
     key = (side, boundary.tobytes())
     if key not in bodies.reduced or bodies.reduced[key].n_modes < count:
         bodies.reduced[key] = craig_bampton(
@@ -490,20 +417,21 @@ def _nodal(
             solver=scene.solver.name,
         )
     model = bodies.reduced[key].truncated(count)
-    nodal = model.at(blade.dofs(face.nodes)).reshape(len(face.nodes), 3, -1)
-    at_points = np.einsum("mk,kcr->mcr", face.values, nodal)
-    seen = model.at(np.array(probes))
+    nodal = np.zeros((len(dofs), len(model.K)))
+    nodal[moves] = model.at(places)
+    at_points = np.einsum("mk,kcr->mcr", face.values, nodal.reshape(len(face.nodes), 3, -1))
+    if bodies.half:
+        at_points[face.position[:, 1] == 0.0, 1] = 0.0
     rows = np.einsum("fc,mcr->mfr", face.frame, at_points)
+    seen = model.at(np.array(probes))
     return BladePart(model.K, model.M, rows, seen, max(model.n_modes, 1) + _BESIDE)
 
 
 def _attached(scene: ForcedScene, bodies: Bodies, side: Side, names: tuple[str, ...]) -> BladePart:
     """By its lowest modes and the static shapes of its points' and probes' forces.
 
-    A half blade has half of the energy, and its points stand for themselves and their mirror
-    images: K and M of the whole are twice its own. Fewer points are means of those that a body was
-    reduced to before: where models with more points follow, for error estimates, to twice the rows
-    at once.
+    Fewer points are means of those that a body was reduced to before: where models with more points
+    follow, for error estimates, to twice the rows at once.
     """
     blade, most = bodies.blades[side], max(scene.reduction.modes, 1) + _BESIDE
     rows, columns = scene.contact.lines(side)
@@ -512,18 +440,15 @@ def _attached(scene: ForcedScene, bodies: Bodies, side: Side, names: tuple[str, 
         (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] == columns),
         (side, 2 * rows if scene.estimates else rows, columns),
     )
-    _, fine, columns = key
-    many = gauss_points(blade.mesh, fine, columns, side)
+    many = gauss_points(blade.mesh, key[1], columns, side)
     if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
         loads = _loads(blade, many, names)
         found = attachment_modes(blade.K, blade.M, loads, most, solver=scene.solver.name)
         bodies.attached[key] = found
     known = bodies.attached[key]
-    twice = 2.0 if bodies.half else 1.0
     seen, probes = np.split(known.rows, [3 * many.n_point])
-    at = fewer_rows(many, rows)
-    seen = np.einsum("mn,ncr->mcr", at, seen.reshape(many.n_point, 3, -1))
-    return BladePart(twice * known.K, twice * known.M, seen, probes, most)
+    seen = np.einsum("mn,ncr->mcr", fewer_rows(many, rows), seen.reshape(many.n_point, 3, -1))
+    return BladePart(known.K, known.M, seen, probes, most)
 
 
 def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> FloatArray:
@@ -538,21 +463,17 @@ def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> FloatArray
     return out
 
 
-def _lowest(blade: BladePart) -> FloatArray:
-    """(r, k) its lowest modes, those to keep."""
-    few = min(len(blade.K), blade.n_modes)
-    return np.asarray(eigh(blade.K, blade.M, subset_by_index=[0, few - 1])[1])
-
-
-def ritz(model: BladePart, modes: FloatArray, rows: FloatArray) -> BladePart:
-    """The blade on what points (rows) and probes see: their static shapes (attachment modes) and
-    the lowest modes.
+def ritz(model: BladePart) -> BladePart:
+    """The blade on what points and probes see: their static shapes (attachment modes) and the
+    lowest modes.
 
     Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static
     compliance exactly. Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics,
     ch. 17.
     """
-    probes = model.probes
+    rows, probes = model.rows, model.probes
+    few = min(len(model.K), model.n_modes)
+    modes = eigh(model.K, model.M, subset_by_index=[0, few - 1])[1]
     B = np.vstack([rows.reshape(-1, len(model.K)), probes])
     B = B[np.linalg.norm(B, axis=1) > np.finfo(float).eps ** 0.5 * np.linalg.norm(B, axis=1).max()]
     static = np.linalg.solve(model.K, B.T)

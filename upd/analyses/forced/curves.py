@@ -33,7 +33,7 @@ from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
-from upd.hbm.faces.sweep import SteppedSine, stepped_sine
+from upd.hbm.faces.sweep import RecordedPeriod, SteppedSine, stepped_sine
 from upd.hbm.springs.balance import Balance
 from upd.linalg.parallel import threads_for
 from upd.results import Case
@@ -191,6 +191,8 @@ class ForcedCurve(Generic[Answer]):
         Peaks on which a point slips or opens, by time integration.
     folds
         Along the path.
+    periods
+        Number of a peak of the right blade -> the last period there, of a sweep.
     """
 
     stiffness: str
@@ -205,6 +207,7 @@ class ForcedCurve(Generic[Answer]):
     tops: Mapping[tuple[Side, int], Top] = field(default_factory=dict)
     checked: tuple[TimeCheck, ...] = ()
     folds: tuple[Fold, ...] = ()
+    periods: Mapping[int, RecordedPeriod] = field(default_factory=dict)
 
     @property
     def case(self) -> Case:
@@ -337,33 +340,6 @@ def finer(frequency: Array, modes: Array, width: Array) -> Array:
     return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
 
 
-def exact_peaks(response: Callable[[Array], ComplexArray], f: Array, grid: Array) -> Peaks:
-    """The peaks of a curve, each by a local search between its neighbours.
-
-    Parameters
-    ----------
-    response
-        The curve at any frequencies (n,) in Hz.
-    f
-        (n,) Hz, rising, fine enough to hold every peak.
-    grid
-        (m,) Hz on which the curve is kept: the point next to a peak is one of these.
-    """
-    a = np.abs(response(f))
-    found = [
-        _top(response, f[i - 1], f[i + 1])
-        for i in np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
-    ]
-    highest = max([float(a.max(initial=0.0)), *(top for _, top in found)])
-    peaks = [
-        CurvePeak(at, top, int(np.abs(grid - at).argmin()))
-        for at, top in found
-        if top >= measures.PEAKS_ABOVE * highest
-    ]
-    # the two highest
-    return sorted(sorted(peaks, key=lambda one: -one.height)[:2])
-
-
 def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:
     # flat at the top: to half of the digits of f, of the height lacks (eps^1/2 f / width)^2
     found = minimize_scalar(
@@ -411,13 +387,23 @@ class Limit(NamedTuple):
         )
 
     def peaks(self, side: Side, grid: Array) -> Peaks:
-        """At most the two highest of a blade within (n,) Hz, rising, numbered; none of one at
-        rest.
+        """At most the two highest of a blade within (n,) Hz, rising, each by a local search,
+        numbered; none of one at rest. The point next to a peak is one of these frequencies.
         """
         if side not in self.moving:
             return []
+        response = partial(self.accelerance, side)
         f = around_modes(self.modes, self.width, float(grid[0]), float(grid[-1]))
-        found = exact_peaks(partial(self.accelerance, side), f, grid)
+        a = np.abs(response(f))
+        tops = np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
+        every = [_top(response, f[i - 1], f[i + 1]) for i in tops]
+        highest = max([float(a.max(initial=0.0)), *(top for _, top in every)])
+        peaks = [
+            CurvePeak(at, top, int(np.abs(grid - at).argmin()))
+            for at, top in every
+            if top >= measures.PEAKS_ABOVE * highest
+        ]
+        found = sorted(sorted(peaks, key=lambda one: -one.height)[:2])
         if self.shapes is None or not found:
             return [peak._replace(number=k) for k, peak in enumerate(found, 1)]
         motion = self.moved(np.array([one.frequency for one in found]))

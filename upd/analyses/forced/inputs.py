@@ -18,11 +18,9 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.spatial import cKDTree
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
-from upd.analyses.forced.blade_parts import MIRROR_SIGNS
 from upd.analyses.forced.curves import Top, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, StuckMode, mode_shapes
 from upd.analyses.forced.model import Array, Model, balance_of, preloaded
@@ -32,7 +30,6 @@ from upd.analyses.seated.interface import damper_compliance
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.springs.points import stuck_stiffness
 from upd.linalg.parallel import threads_for
-from upd.mesh import IntArray
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
@@ -279,29 +276,16 @@ def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
     Array
         (n, n), n = n_point (1 + tangents), point by point; symmetric, positive semidefinite.
     """
-    nodes, shares = zip(*(_on_nodes(bodies, model, side) for side in SIDES), strict=True)
-    G = damper_compliance(plan, bodies, nodes)[0]
-    at, n = np.stack([block_diag(*one) for one in zip(*shares, strict=True)]), len(G) // 3
+    faces = [model.faces[side] for side in SIDES]
+    G = damper_compliance(plan, bodies, [face.nodes for face in faces])[0]
+    # shares of the nodes in the motion of the points along their frames
+    at = np.stack([block_diag(*(face.values for face in faces))] * 3)
+    if bodies.half:
+        at[1, model.position[:, 1] == 0.0] = 0.0
+    n = len(G) // 3
     G = np.einsum("fmn,fngk,gpk->mfpg", at, G.reshape(3, n, 3, n), at, optimize=True)
     components = [0, 1, 2] if model.contacts.tangents == 2 else [0, 2]
     rows = len(at[0]) * len(components)
     # a half has half of the forces
     part = 0.5 if bodies.half else 1.0
     return np.asarray(part * G[:, components][..., components].reshape(rows, rows))
-
-
-def _on_nodes(bodies: Bodies, model: Model, side: Side) -> tuple[IntArray, Array]:
-    """Nodes (n,) of a face that its points move with, and their shares (3, m, n) in the motion of
-    the points along its frame; a point that stands for a pair moves as the even part of both.
-    """
-    face, mesh = model.faces[side], bodies.blades[side].mesh
-    if bodies.half or not model.halved:
-        return face.nodes, np.stack([face.values] * 3)
-    patch, mirrored = mesh.nodes["patch"], mesh.points[face.nodes] * np.array([1.0, -1.0, 1.0])
-    image = patch[cKDTree(mesh.points[patch]).query(mirrored)[1]]
-    nodes, place = np.unique(np.concatenate([face.nodes, image]), return_inverse=True)
-    own, other = np.split(place, 2)
-    shares = np.zeros((3, face.n_point, len(nodes)))
-    shares[:, :, own] += 0.5 * face.values
-    shares[:, :, other] += 0.5 * MIRROR_SIGNS[:, None, None] * face.values
-    return nodes, shares

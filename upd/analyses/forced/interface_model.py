@@ -33,7 +33,6 @@ from upd.analyses.forced.plan import ForcedPlan, excitation_of, time_steps
 from upd.analyses.forced.statics import GIVEN, SEATED, StaticState, point_preload, static_state
 from upd.analyses.seated.bodies import Blade, Bodies, lattice, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.contact import CoupledContact
 from upd.contact.coulomb import Coulomb
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.fourier import to_complex
@@ -108,13 +107,12 @@ def _begin(
                 f'contact.static: "{static}" was not solved on these faces ({error}); to fix it: '
                 "take another static state or contact.fit"
             ) from error
-        model = replace(model, gap=gap)
-        if static == SEATED:
-            return model, seated_start(model, found)
-        # without friction nothing keeps account of what slipped: it sticks from where it lies
-        last = found.history
-        w = of.columns @ last.motion - of.compliance @ last.force.T.ravel()
-        slip = w.reshape(3, -1)[1:].T
+        model, last = replace(model, gap=gap), found.history
+        slip = last.slip
+        if static != SEATED:
+            # without friction nothing keeps account of what slipped: it sticks from where it lies
+            w = of.columns @ last.motion - of.compliance @ last.force.T.ravel()
+            slip = w.reshape(3, -1)[1:].T
         return model, resting(model, last.force, slip, last.gap, last.motion)
     if worn < 1.0:
         raise InputError(
@@ -249,12 +247,6 @@ def _part(blade: Blade, n_modes: int, solver: str) -> tuple[Array, Array, Array,
         patch[:, :, n_modes:].transpose(2, 0, 1),
         moved[probes],
     )
-
-
-def seated_start(model: InterfaceModel, seated: CoupledContact) -> InterfaceState:
-    """Where a march starts: the end of a seating on the same faces, at rest."""
-    last = seated.history
-    return resting(model, last.force, last.slip, last.gap, last.motion)
 
 
 def worn_start(

@@ -12,13 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 
-from upd.analyses.forced.blade_parts import (
-    EVEN_DOFS,
-    FacePoints,
-    MirrorPairs,
-    reduced_blades,
-    symmetric,
-)
+from upd.analyses.forced.blade_parts import FacePoints, reduced_blades, symmetric
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.seated.bodies import Bodies
@@ -43,6 +37,8 @@ from upd.scene.forced_contact import SIDES, FaceStiffness, Side
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 _AXIS_Y = 1
+#: damper dofs that are even about y = 0: ux, uz and the rotation about y
+_EVEN_DOFS = (0, 2, 4)
 #: relative change of the stuck frequencies up to which sliding along the damper is not resisted
 ALONG_MATTERS = 1e-3
 
@@ -125,21 +121,8 @@ class Model:
     @property
     def system(self) -> dict[str, Any]:
         """What `upd.hbm` takes of it, the excitation aside."""
-        return {
-            "M": self.M,
-            "C": self.C,
-            "K": self.K,
-            "contacts": self.contacts,
-            "static_force": self.static,
-            "damper": self.damper,
-            "damper_rows": self.damper_rows,
-            "slider": self.slider,
-        }
-
-    @property
-    def halved(self) -> bool:
-        """Whether a contact point stands for itself and its mirror image about y = 0."""
-        return self.damper.n_dof < 6
+        own = ("M", "C", "K", "contacts", "damper", "damper_rows", "slider")
+        return {name: getattr(self, name) for name in own} | {"static_force": self.static}
 
     def linear(self, stuck: bool) -> tuple[Array, Array, Array, Array]:
         """M, C, K (n, n) of blades and damper and rows B of the points, without contacts or with
@@ -180,28 +163,23 @@ def make_model(
         The static state, with contact.fit = "loaded"; that of the scene when None.
     """
     scene = plan.scene
-    whole, small, pairs = reduced_blades(plan, bodies)
-    half = pairs is not None or bodies.half
-    faces = {side: pairs[side].face(whole[side]) for side in SIDES} if pairs else whole
+    faces, small = reduced_blades(plan, bodies)
     K, M = block_diag(*(one.K for one in small)), block_diag(*(one.M for one in small))
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
-    n = [len(one.K) for one in small]
     # M has a block for each blade
-    blades = slice(0, n[0]), slice(n[0], n[0] + n[1])
-    share = np.stack([(shapes[on] * (M @ shapes)[on]).sum(axis=0) for on in blades], 1)
-    damping = scene.modal_damping(frequency, share)
-    before_after = ((0, n[1]), (n[0], 0))
-    rows = np.concatenate(
-        [
-            np.pad(one.rows, ((0, 0), (0, 0), at))
-            for one, at in zip(small, before_after, strict=True)
-        ]
-    )
-    probes = [np.pad(one.probes, ((0, 0), at)) for one, at in zip(small, before_after, strict=True)]
+    on_blade = np.repeat(np.eye(len(SIDES)), [len(one.K) for one in small], axis=0)
+    damping = scene.modal_damping(frequency, (shapes * (M @ shapes)).T @ on_blade)
+    rows = block_diag(*(one.rows.reshape(-1, len(one.K)) for one in small)).reshape(-1, 3, len(K))
+    probes = block_diag(*(one.probes for one in small))
+    # of each blade its accelerometer, and behind it the node of its force
+    seen = dict(zip(SIDES, (0, len(small[0].probes)), strict=True))
     excitation = excitation_of(scene.excitation)
-    damper = _rigid(scene, bodies, half)
-    k_n, k_t = _stiffnesses(whole, laws, pairs)
+    damper = _rigid(scene, bodies)
+    k_n, k_t = (
+        np.concatenate([getattr(laws[side], of) * faces[side].weight for side in SIDES])
+        for of in ("K_N", "K_T")
+    )
     # the blade's motion opens the contact that the damper's closes
     made = contacts(
         -rows[:, 0], [-rows[:, 1], -rows[:, 2]], k_n=k_n, k_t=k_t, mu=scene.contact.friction
@@ -215,9 +193,9 @@ def make_model(
         M,
         modal_damping(M, shapes, frequency, damping),
         K,
-        np.stack([probes[SIDES.index(side)][1] for side in excitation.blades], axis=1),
+        probes[[seen[side] + 1 for side in excitation.blades]].T,
         excitation,
-        {"left": probes[0][0], "right": probes[1][0]},
+        {side: probes[seen[side]] for side in SIDES},
         faces,
         laws,
         made,
@@ -230,38 +208,23 @@ def make_model(
         np.zeros((made.n_point, made.tangents)),
     )
     directions = scene.contact.directions
-    if directions == "one" or (directions == "auto" and half and not _along_matters(model)):
+    if directions == "one" or (directions == "auto" and bodies.half and not _along_matters(model)):
         model = _without_along(model)
     if not scene.contact.loaded:
         return model
     return preloaded(model, state or static_state(plan, bodies))
 
 
-def _rigid(scene: ForcedScene, bodies: Bodies, half: bool) -> RigidDamper:
-    """The whole damper, in all its motions or those even about y = 0."""
+def _rigid(scene: ForcedScene, bodies: Bodies) -> RigidDamper:
+    """The whole damper, in all its motions or, of halves, those even about y = 0."""
     own = bodies.damper.with_mirror_image(_AXIS_Y) if bodies.half else bodies.damper
     return rigid_damper(
         own.mass,
         symmetric(own.inertia),
         own.centre,
         [0.0, 0.0, scene.damper.centrifugal],
-        kept=EVEN_DOFS if half else range(6),
+        kept=_EVEN_DOFS if bodies.half else range(6),
     )
-
-
-def _stiffnesses(
-    faces: Mapping[Side, FacePoints],
-    laws: Mapping[Side, FaceStiffness],
-    pairs: Mapping[Side, MirrorPairs] | None,
-) -> list[Array]:
-    """k_n and k_t of all points, of pairs together."""
-    sized = {
-        side: (laws[side].K_N * faces[side].weight, laws[side].K_T * faces[side].weight)
-        for side in SIDES
-    }
-    if pairs is not None:
-        sized = {s: (pairs[s].total(k_n), pairs[s].total(k_t)) for s, (k_n, k_t) in sized.items()}
-    return [np.concatenate([sized[side][j] for side in SIDES]) for j in range(2)]
 
 
 def preloaded(model: Model, state: StaticState) -> Model:

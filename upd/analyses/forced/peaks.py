@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
-from typing import NamedTuple
 
 import numpy as np
 
@@ -206,17 +205,11 @@ def confirmed(plan: ForcedPlan, model: Model, curve: PointCurve) -> PointCurve:
     return replace(curve, peaks=stable, checked=tuple(checked))
 
 
-class _Steady(NamedTuple):
-    """A motion that stays: heights (2, 2) of the blades by harmonic balance and by time
-    integration, (m/s2)/N, and its state at the end of a period.
-    """
-
-    heights: Array
-    state: InterfaceState
-
-
+#: a motion that stays: heights (2, 2) of the blades by harmonic balance and by time integration,
+#: (m/s2)/N, and its state at the end of a period
+_Steady = tuple[Array, InterfaceState]
 #: the last motion that stays on a way up to a top: its place on the path, the next one towards the
-#: top, heights as of `_Steady`
+#: top, heights of `_Steady`
 _Reached = tuple[int, int, Array]
 
 
@@ -239,7 +232,7 @@ def confirmed_top(
     k = SIDES.index(side)
     best = TimeCheck(side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample)
     if (both := integrate(top.x, top.frequency, None)) is not None:
-        balance, integrated = (float(one) for one in both.heights[:, k])
+        balance, integrated = (float(one) for one in both[0][:, k])
         return replace(best, balance=balance, integrated=integrated, sample=AT_TOP)
     size, f = np.abs(curve.accelerance[side]), curve.frequency
     if peak.number not in motions:
@@ -281,10 +274,10 @@ def _highest(
     # up again from its own motion, as long as that grows
     for k in range(high - 1, -1, -1):
         further = integrate(x[way[k]], float(f[way[k]]), kept)
-        if further is None or np.linalg.norm(further.heights[1]) < np.linalg.norm(kept.heights[1]):
+        if further is None or np.linalg.norm(further[0][1]) < np.linalg.norm(kept[0][1]):
             break
         high, kept = k, further
-    return way[high], way[max(high - 1, 0)], kept.heights
+    return way[high], way[max(high - 1, 0)], kept[0]
 
 
 def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
@@ -316,7 +309,7 @@ def stays(
     b, force, k = curve.answer.balance, curve.force, model.excitation.lowest
     scale = 1e-3 * (2.0 * np.pi * k * f) ** 2 / force
     march = InterfaceMarch(springs.march, f, force * model.excitation.drive, steps, by_coulomb)
-    at = state_at(springs, model, b, x, f, force) if before is None else before.state.copy()
+    at = state_at(springs, model, b, x, f, force) if before is None else before[1].copy()
     try:
         # beside the end of a branch a motion settles slowly
         found = settle(march, at, TOLERANCE, PERIODS if before is None else 2 * PERIODS)
@@ -328,9 +321,9 @@ def stays(
     balance = np.array([abs(H[side][0]) for side in SIDES])
     size, near, room = np.linalg.norm(balance), balance, STAYS
     if before is not None:
-        near = before.heights[1]
-        room += abs(float(size / np.linalg.norm(before.heights[0])) - 1.0)
+        near = before[0][1]
+        room += abs(float(size / np.linalg.norm(before[0][0])) - 1.0)
     change = float(np.linalg.norm(integrated) / np.linalg.norm(near)) - 1.0
     if abs(change) > room or not found.remaining <= STAYS:
         return None
-    return _Steady(np.array([balance, integrated]), at)
+    return np.array([balance, integrated]), at

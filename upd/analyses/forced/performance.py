@@ -12,8 +12,9 @@ at rest only amplitude over F_C matters: one curve serves every F_C and every ex
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +31,6 @@ from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.points import Start
 from upd.hbm.springs.response import parabola, response_of
 from upd.linalg.parallel import threads_for
-from upd.linalg.processes import Job
 from upd.results import Case, Result, variable
 from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
@@ -47,9 +47,9 @@ class RatioPoint(NamedTuple):
     arrived: bool
 
     @property
-    def worst(self) -> CurvePeak | None:
-        """The highest of both blades and all modes."""
-        return max(self.peaks, key=lambda one: one.height, default=None)
+    def worst(self) -> CurvePeak:
+        """The highest of both blades and all modes, of a point with peaks."""
+        return max(self.peaks, key=lambda one: one.height)
 
 
 @dataclass(frozen=True)
@@ -62,40 +62,44 @@ class Performance:
         The curves, F_C/F_E rising.
     free, stuck
         Highest peaks of both limits, (m/s2)/N.
-    again
-        A point near the best one, and the same with the harmonics of the run; None where these are
-        no more.
     """
 
     points: tuple[RatioPoint, ...]
     free: float
     stuck: float
-    again: tuple[RatioPoint, RatioPoint] | None = None
 
     @property
     def known(self) -> list[RatioPoint]:
         """The points with a peak."""
-        return _known(self.points)
+        return [one for one in self.points if one.peaks and one.arrived]
 
     @property
     def best(self) -> RatioPoint | None:
         """The point whose highest peak is lowest; None without points."""
-        return _best(self.points)
+        return min(self.known, key=lambda one: one.worst.height, default=None)
 
     @property
     def inside(self) -> bool:
         """Whether the best is no end of the curve."""
         return self.best is not None and self.best not in (self.known[0], self.known[-1])
 
+    def beside_best(self) -> list[float]:
+        """F_C/F_E between the best one and its neighbours."""
+        if len(self.known) < 3:
+            return []
+        ratios = [one.ratio for one in self.known]
+        k = int(np.argmin([one.worst.height for one in self.known]))
+        return [math.sqrt(a * b) for a, b in pairwise(ratios[max(k - 1, 0) : k + 2])]
+
     def factor_two(self) -> tuple[float, float] | None:
         """The highest peak at half and at twice the best F_C/F_E, over that at the best: between
         those of the curve on logarithmic axes, nan beyond its ends.
         """
         best, known = self.best, self.known
-        if best is None or best.worst is None:
+        if best is None:
             return None
         x = np.log([one.ratio for one in known])
-        y = np.log([one.worst.height for one in known if one.worst is not None])
+        y = np.log([one.worst.height for one in known])
         at = math.log(best.ratio) + np.log([0.5, 2.0])
         low, high = np.exp(np.interp(at, x, y, left=np.nan, right=np.nan)) / best.worst.height
         return float(low), float(high)
@@ -105,15 +109,12 @@ def peaks_at(
     plan: ForcedPlan,
     model: Model,
     ratio: float,
-    harmonics: int,
     start: Start | None = None,
 ) -> RatioPoint:
     """The peaks of the whole curve at one F_C/F_E.
 
     Parameters
     ----------
-    harmonics
-        The highest of the balance.
     start
         Of the sliders; that of the scene when None.
     """
@@ -121,7 +122,7 @@ def peaks_at(
     span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
     sweep = fine_grid(plan, model, span)
     settings = replace(LONG_STEPS, most_points=MOST_PATH_POINTS)
-    b = balance_of(plan, model, force, range(harmonics + 1), start=start)
+    b = balance_of(plan, model, force, start=start)
     found: dict[tuple[Side, int], CurvePeak] = {}
     up_to = -math.inf
     with threads_for(len(model.M)):
@@ -154,93 +155,31 @@ def ratios_of(plan: ForcedPlan) -> list[float]:
     return [float(one) for one in np.geomspace(choice.lowest, choice.highest, choice.points)]
 
 
-def harmonics_of(plan: ForcedPlan) -> int:
-    """The highest harmonic of the curve: its own choice, or that of the balance."""
-    scene = plan.scene
-    given, run = scene.performance.harmonics, scene.balance.harmonics
-    return int(run if given is None else max(given, scene.excitation.highest_harmonic))
-
-
-def beside_best(points: Sequence[RatioPoint]) -> list[float]:
-    """F_C/F_E between the best one and its neighbours."""
-    known = sorted(_known(points), key=lambda one: one.ratio)
-    heights = [one.worst.height for one in known if one.worst is not None]
-    if len(heights) < 3:
-        return []
-    k = int(np.argmin(heights))
-    pairs = [(known[i].ratio, known[i + 1].ratio) for i in (k - 1, k) if 0 <= i < len(known) - 1]
-    return [math.sqrt(a * b) for a, b in pairs]
-
-
-def with_curves(points: Sequence[RatioPoint], curves: Iterable[PointCurve]) -> list[RatioPoint]:
-    """Points solved by `peaks_at` and those of the run's curves, of the same contact stiffness."""
-    own = [of_curve(one) for one in curves if not one.empty]
-    # of two of the same F_C/F_E the one that arrived
-    own = [o for o in own if o.arrived or not any(_same(o.ratio, p.ratio) for p in points)]
-    return [*(one for one in points if not any(_same(one.ratio, o.ratio) for o in own)), *own]
-
-
-def further_points(
-    plan: ForcedPlan, model: Model, points: Sequence[RatioPoint], first: Sequence[RatioPoint]
-) -> list[Job]:
-    """What is solved once the first points are known: curves beside the best of all, and the best
-    of the first again with the harmonics of the run, where it has more.
-
-    Parameters
-    ----------
-    points
-        Those of `with_curves`.
-    first
-        Those solved by `peaks_at`.
-    """
-    highest, run = harmonics_of(plan), plan.scene.balance.harmonics
-    jobs: list[Job] = [(peaks_at, (plan, model, r, highest)) for r in beside_best(points)]
-    best = _best(first)
-    if best is not None and highest < int(run):
-        jobs.append((peaks_at, (plan, model, best.ratio, int(run))))
-    return jobs
-
-
 def performance_of(
-    linear: LinearCurves,
-    points: Iterable[RatioPoint],
-    further: Iterable[RatioPoint],
+    linear: LinearCurves, points: Iterable[RatioPoint], curves: Iterable[PointCurve]
 ) -> Performance:
-    """The performance curve of solved points.
+    """The performance curve.
 
     Parameters
     ----------
+    linear
+        Limits of the contact stiffness.
     points
-        Those of `with_curves`.
-    further
-        Those of `further_points`.
+        Those of `peaks_at`.
+    curves
+        Of the run, of the same contact stiffness: of two of the same F_C/F_E the one that arrived
+        counts, its own first.
     """
-    found, again = list(points), None
-    for one in further:
-        base = next((p for p in found if _same(p.ratio, one.ratio)), None)
-        if base is None:
-            found.append(one)
-        else:
-            again = (base, one)
+    found = list(points)
+    for one in map(of_curve, curves):
+        same = [p for p in found if math.isclose(p.ratio, one.ratio, rel_tol=1e-6)]
+        if one.arrived or not same:
+            found = [*(p for p in found if p not in same), one]
     free, stuck = (
-        max((p.height for s in SIDES for p in peaks[s]), default=float("nan"))
+        max((p.height for s in SIDES for p in peaks[s]), default=math.nan)
         for peaks in (linear.free_peaks, linear.stuck_peaks)
     )
-    ordered = tuple(sorted(found, key=lambda one: one.ratio))
-    return Performance(ordered, free, stuck, again)
-
-
-def _known(points: Iterable[RatioPoint]) -> list[RatioPoint]:
-    return [one for one in points if one.peaks and one.arrived]
-
-
-def _best(points: Iterable[RatioPoint]) -> RatioPoint | None:
-    """The point whose highest peak is lowest; None without points."""
-    return min(_known(points), key=lambda one: max(p.height for p in one.peaks), default=None)
-
-
-def _same(a: float, b: float) -> bool:
-    return math.isclose(a, b, rel_tol=1e-6)
+    return Performance(tuple(sorted(found, key=lambda one: one.ratio)), free, stuck)
 
 
 # -- numbers and arrays ----------------------------------------------------------------------------
@@ -256,7 +195,7 @@ def performance_results(name: str, found: Performance) -> list[Result]:
             q.HIGHEST_RATIO.of(known[-1].ratio, case),
         ]
     best, twice = found.best, found.factor_two()
-    if best is None or best.worst is None or twice is None:
+    if best is None or twice is None:
         reason = "no curve has a peak: widen excitation.start and stop"
         return results + [quantity.withheld(case, reason) for quantity in q.BEST]
     results.append(q.BEST_INSIDE.of(found.inside, case))
@@ -285,7 +224,7 @@ def performance_arrays(found: Performance) -> dict[str, Any]:
         "ratio": variable(at, ratio, "1", "F_C/F_E"),
         "highest_accelerance": variable(
             at,
-            [one.worst.height for one in points if one.worst is not None],
+            [one.worst.height for one in points],
             "(m/s2)/N",
             "highest peak of both blades and all modes",
         ),
@@ -294,15 +233,13 @@ def performance_arrays(found: Performance) -> dict[str, Any]:
     }
     for (blade, number), mode in sorted(modes.items()):
         rows = np.full((2, len(points)), np.nan)
-        for k, one in enumerate(points):
-            for p in one.peaks:
-                if (p.blade, p.number) == (blade, number):
-                    rows[:, k] = p.frequency, p.height
+        for k, p in ((k, p) for k, one in enumerate(points) for p in one.peaks):
+            if (p.blade, p.number) == (blade, number):
+                rows[:, k] = p.frequency, p.height
         about = {"mode": mode, "blade": blade}
         out[f"peak_{number}_frequency_{blade}"] = variable(at, rows[0], "Hz", **about)
         out[f"peak_{number}_accelerance_{blade}"] = variable(at, rows[1], "(m/s2)/N", **about)
-    best = found.best
-    if best is not None and best.worst is not None:
+    if best := found.best:
         out |= {
             "best_ratio": variable("", best.ratio, "1", "F_C/F_E"),
             "best_accelerance": variable("", best.worst.height, "(m/s2)/N"),
@@ -425,14 +362,13 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
     limit, slope = mu * rest[:, 0], mu * moved[:, 0]
     C = np.sum(rest[:, 1:] ** 2, axis=1) - limit**2
     A = np.sum(moved[:, 1:] ** 2, axis=1) - slope**2
-    found = [np.inf]
-    for sign in (1.0, -1.0):
-        B = 2.0 * sign * (np.sum(rest[:, 1:] * moved[:, 1:], axis=1) - limit * slope)
-        inside = B**2 - 4.0 * A * C
-        below = B + np.sqrt(np.maximum(inside, 0.0))
-        good = (C < 0.0) & (inside >= 0.0) & (below > 0.0)
-        found += list(-2.0 * C[good] / below[good])
-    if not np.isfinite(least := float(min(found))):
+    # one row for each way
+    B = np.outer([2.0, -2.0], np.sum(rest[:, 1:] * moved[:, 1:], axis=1) - limit * slope)
+    inside = B**2 - 4.0 * A * C
+    below = B + np.sqrt(np.maximum(inside, 0.0))
+    good = (C < 0.0) & (inside >= 0.0) & (below > 0.0)
+    found = np.divide(-2.0 * C, below, out=np.full_like(below, np.inf), where=good)
+    if not np.isfinite(least := float(found.min())):
         raise InputError(
             "nonlinear modes: no point sticks at rest and slips as the amplitude grows; give "
             'contact.friction, or contact.static = "frictionless"'

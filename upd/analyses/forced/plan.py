@@ -74,9 +74,14 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     again = _AROUND * (cost.seconds + cost.shared)
     again *= solves and (scene.estimates or scene.left_out.solves)
     cost.seconds += again
-    symmetry = "full" if scene.mesh.symmetry == "full" else "half"
     return ForcedPlan.of(
-        cost, symmetry, parameters, effects_of(scene), needs, _FILES_S, estimate_seconds=again
+        cost,
+        parameters["symmetry"],
+        parameters,
+        effects_of(scene),
+        needs,
+        _FILES_S,
+        estimate_seconds=again,
     )
 
 
@@ -98,10 +103,8 @@ def _add_whole_faces(cost: CostModel, scene: ForcedScene) -> None:
 
 def parameters_of(scene: ForcedScene) -> dict[str, Any]:
     """Of the recipe."""
-    # points on lattice lines pair themselves
-    apart = scene.contact.rule == GAUSS
-    half = (scene.contact.model == "interface" or apart) and scene.mesh.symmetry != "full"
-    return rig_parameters(scene, "half" if half else "full", NODES[scene.mesh.element])
+    symmetry = "full" if scene.mesh.symmetry == "full" else "half"
+    return rig_parameters(scene, symmetry, NODES[scene.mesh.element])
 
 
 def _add_points(cost: CostModel, scene: ForcedScene) -> None:
@@ -150,15 +153,16 @@ def time_steps(scene: ForcedScene) -> int:
 
 def _points(scene: ForcedScene, size: Mapping[str, Count]) -> float:
     """Contact points of both faces, roughly: one for itself and its mirror image."""
-    total = 0.0
+    total, whole = 0.0, scene.mesh.symmetry == "full"
     for side in SIDES:
         # of the nodes of quadratic elements those at corners
-        lines = math.sqrt(size[side]["contact"] * 8 / NODES[scene.mesh.element])
+        nodes = size[side]["contact"] * (1.0 if whole else 2.0)
+        lines = math.sqrt(nodes * 8 / NODES[scene.mesh.element])
         rows, columns = (
             lines if one == "all" else float(one if isinstance(one, int) else len(one))
             for one in scene.contact.lines(side)
         )
-        total += rows * (columns if scene.mesh.symmetry == "full" else math.ceil(0.5 * columns))
+        total += rows * (columns if whole else math.ceil(0.5 * columns))
     return total
 
 

@@ -175,17 +175,22 @@ def contact_of(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Contact | N
         state = np.array([one.nodes for one in a.points])[:, :, [1, 2, 0]]
         loss = np.array([one.loss for one in a.points])
         return Contact(solution.marked_points(curve), f, state, loss)
-    found = [one for one in solution.marched if one.sweep.case == curve.case]
-    if not found:
+    peaks = [one for one in curve.peaks["right"] if one.number in curve.periods]
+    if not peaks:
         return None
+    periods = [curve.periods[one.number] for one in peaks]
     return Contact(
-        [(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)],
-        np.array([one.frequency for one in found]),
-        np.array([one.period.share for one in found]),
+        [(one.number, one.mode, i) for i, one in enumerate(peaks)],
+        f[[one.sample for one in peaks]],
+        np.array([one.share for one in periods]),
         # of a half model each node stands for its image too
-        np.array([one.period.copies * one.period.loss for one in found]),
-        np.stack([marched_damper(solution, one) for one in found], axis=1),
-        ((one.peak.number, loop) for one in found for loop in marched_loops(one, N_LOOPS)),
+        np.array([one.copies * one.loss for one in periods]),
+        np.stack([marched_damper(solution, curve, one) for one in periods], axis=1),
+        (
+            (one.number, loop)
+            for one in peaks
+            for loop in marched_loops(solution, curve, curve.periods[one.number], N_LOOPS)
+        ),
     )
 
 

@@ -64,39 +64,6 @@ class ContactPlaces:
     compliance: Array
 
 
-@dataclass(frozen=True)
-class MarchedPeak:
-    """The last period of a sweep at one of its peaks, node by node.
-
-    Attributes
-    ----------
-    sweep, peak
-        The peak and the sweep that has it.
-    period
-        What the contact does.
-    places
-        Of its nodes.
-    motion
-        (N, 6) of the damper from its rest, mm and rad.
-    """
-
-    sweep: SweptCurve
-    peak: CurvePeak
-    period: RecordedPeriod
-    places: ContactPlaces
-    motion: Array
-
-    @property
-    def frequency(self) -> float:
-        """Hz, of the point of the sweep next to the peak."""
-        return float(self.sweep.frequency[self.peak.sample])
-
-    @property
-    def case(self) -> Case:
-        """What its numbers belong to."""
-        return replace(self.sweep.case, peak=self.peak.number, mode=self.peak.mode)
-
-
 @dataclass
 class ForcedSolution:
     """All that was solved, for results, checks and arrays.
@@ -111,7 +78,6 @@ class ForcedSolution:
     linear: dict[str, LinearCurves] = field(default_factory=dict)
     curves: list[ForcedCurve[Any]] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
-    marched: list[MarchedPeak] = field(default_factory=list)
     band: list[Result] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     nonlinear_modes: list[ModeCurve] = field(default_factory=list)
@@ -129,13 +95,13 @@ class ForcedSolution:
         """Of the contact points, or of the nodes of whole faces."""
         if stiffness in self.faces:
             of = self.faces[stiffness].of
-            along, up = measures.in_faces(of.position, of.face, of.frame)
-            return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+            place = measures.in_faces(of.position, of.face, of.frame)
+            return ContactPlaces(of.face, *place, of.area, np.zeros(of.n))
         model, law = self.models[stiffness], self.models[stiffness].contacts.law
         frames = [model.faces[side].frame for side in SIDES]
-        along, up = measures.in_faces(model.position, model.face, frames)
+        place = measures.in_faces(model.position, model.face, frames)
         springs = np.divide(1.0, law.k_t, out=np.zeros_like(law.k_t), where=law.k_t > 0.0)
-        return ContactPlaces(model.face, along, up, law.k_n, springs)
+        return ContactPlaces(model.face, *place, law.k_n, springs)
 
     def marked_points(self, curve: ForcedCurve[Any]) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
@@ -155,23 +121,9 @@ class ForcedSolution:
 WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
-def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
-    """The last period of a sweep at one of its peaks, integrated again and kept."""
-    name = sweep.stiffness
-    if name in solution.faces:
-        faces = solution.faces[name]
-        rest, kept = faces.start.s, list(faces.of.kept)
-    else:
-        # springs count from the static state
-        damper = solution.models[name].damper
-        rest, kept = np.zeros(damper.n_dof), list(damper.kept)
-    period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
-    motion = np.zeros((len(period.motion), 6))
-    motion[:, kept] = period.motion - rest
-    return MarchedPeak(sweep, peak, period, solution.places(name), motion)
-
-
-def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
+def marched_loops(
+    solution: ForcedSolution, sweep: SweptCurve, period: RecordedPeriod, count: int
+) -> list[Loop]:
     """Loops of the nodes that lose most, as `upd.analyses.forced.measures.loops`.
 
     The displacement is the slip and what the springs give, f_t / k_t, about its mean: the march
@@ -179,19 +131,21 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
 
     Parameters
     ----------
-    one
-        A peak.
+    sweep, period
+        The sweep, and its last period at a peak.
     count
         Loops at most.
     """
-    period, friction = one.period, one.sweep.answer.model.friction
-    force = period.force.transpose(2, 1, 0)
-    motion = period.slip.transpose(2, 1, 0) + one.places.compliance[:, None, None] * force[:, 1:]
+    force, friction = period.force.transpose(2, 1, 0), sweep.answer.model.friction
+    compliance = solution.places(sweep.stiffness).compliance[:, None, None]
+    motion = period.slip.transpose(2, 1, 0) + compliance * force[:, 1:]
     motion -= motion.mean(axis=2, keepdims=True)
     return measures.largest_loops(period.loss, motion, force, friction, count)
 
 
-def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:
+def marched_damper(
+    solution: ForcedSolution, sweep: SweptCurve, period: RecordedPeriod
+) -> tuple[Array, Array]:
     """Motion of the damper's six dofs about its rest, as
     `upd.analyses.forced.measures.damper_motion`.
 
@@ -200,9 +154,17 @@ def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, A
     static, amplitude
         (6,) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
     """
-    k, N = excitation_of(solution.plan.scene.excitation).lowest, len(one.motion)
+    if (faces := solution.faces.get(sweep.stiffness)) is not None:
+        rest, kept = faces.start.s, list(faces.of.kept)
+    else:
+        # springs count from the static state
+        damper = solution.models[sweep.stiffness].damper
+        rest, kept = np.zeros(damper.n_dof), list(damper.kept)
+    N, k = len(period.motion), excitation_of(solution.plan.scene.excitation).lowest
+    motion = np.zeros((N, 6))
+    motion[:, kept] = period.motion - rest
     turn = np.exp(-2j * np.pi * k * np.arange(1, N + 1) / N)
-    return one.motion.mean(axis=0), np.abs(2.0 / N * turn @ one.motion)
+    return motion.mean(axis=0), np.abs(2.0 / N * turn @ motion)
 
 
 # -- the run ---------------------------------------------------------------------------------------
@@ -259,16 +221,17 @@ def _sweep(
     start: InterfaceState,
     stages: Stages,
 ) -> None:
-    """Sweeps up and down at every F_C/F_E, and their peaks."""
+    """Sweeps up and down at every F_C/F_E, with the last period at their peaks where it is read."""
+    read = any(solution.plan.scene.wants(one) for one in WANTS)
     for ratio in solution.plan.scene.excitation.centrifugal_to_force:
         with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
-            solution.curves += curves.both_ways(solution.plan, name, ratio, march, start)
-    if not any(solution.plan.scene.wants(one) for one in WANTS):
-        return
-    for sweep in (c for c in solution.curves if c.stiffness == name):
-        for top in sweep.peaks["right"]:
-            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
-                solution.marched.append(marched_peak(solution, sweep, top))
+            for sweep in curves.both_ways(solution.plan, name, ratio, march, start):
+                tops = sweep.peaks["right"] if read else ()
+                periods = {
+                    top.number: period_of_sweep(sweep.answer, top.sample, by_coulomb)
+                    for top in tops
+                }
+                solution.curves.append(replace(sweep, periods=periods))
 
 
 def _models(solution: ForcedSolution, stages: Stages) -> None:
@@ -341,9 +304,8 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
             curve = plan, model, solution.linear[name], name, ratio
             work.append(_Work(solution.curves.append, solve_curve, curve, needed=True))
     if scene.wants("performance"):
-        highest = performance.harmonics_of(plan)
         for ratio in performance.ratios_of(plan):
-            point = plan, solution.models[names[0]], ratio, highest
+            point = plan, solution.models[names[0]], ratio
             work.append(_Work(points.append, performance.peaks_at, point))
     work += _mode_work(solution)
     with stages("friction", f"{len(names) * len(order)} curves, {len(work)} pieces"), quiet():
@@ -366,22 +328,20 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
     ):
         for in_phase in (True, False):
             mode = solution.plan, model, solution.linear[name], name, in_phase
-            yield _Work(
-                solution.nonlinear_modes.append, performance.mode_over_amplitude, mode, needed=True
-            )
+            into = solution.nonlinear_modes.append
+            yield _Work(into, performance.mode_over_amplitude, mode, needed=True)
 
 
 def _around(
     solution: ForcedSolution,
     variants: Mapping[str, Sequence[again.Variant | SolvedVariation]],
-    points: Sequence[RatioPoint],
+    points: list[RatioPoint],
     beside: SideProcesses,
 ) -> None:
     """What is solved again around the peaks: once, on the reduced models."""
     plan, bodies, first = solution.plan, solution.bodies, next(iter(solution.models))
     assert bodies is not None
     scene, work = plan.scene, list[_Work]()
-    further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
         given = with_totals(plan, name, model), name, model, solution.linear[name]
@@ -393,20 +353,18 @@ def _around(
             solution.omissions += inputs.elastic_changes(run, bodies)
         if name == first:
             if scene.wants("performance"):
-                jobs = performance.further_points(
-                    plan, model, performance.with_curves(points, mine), points
-                )
-                work += [_Work(further.append, *job) for job in jobs]
+                curve = partial(performance.performance_of, solution.linear[name], points, mine)
+                work += [
+                    _Work(points.append, performance.peaks_at, (plan, model, ratio))
+                    for ratio in curve().beside_best()
+                ]
             if scene.wants("inputs") or scene.left_out.solves:
                 work += _at_few_harmonics(solution, run, bodies)
             if scene.wants("band"):
                 work += _band(solution, name)
     _done(beside, work)
     if scene.wants("performance"):
-        mine = tuple(c for c in solution.curves if c.stiffness == first)
-        solution.performances[first] = performance.performance_of(
-            solution.linear[first], performance.with_curves(points, mine), further
-        )
+        solution.performances[first] = curve()
 
 
 def _at_few_harmonics(solution: ForcedSolution, run: again.Run, bodies: Bodies) -> Iterator[_Work]:
@@ -432,25 +390,20 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     """Curves from every other named static state, and other starts of the sliders."""
     plan, model, bodies = solution.plan, solution.models[name], solution.bodies
     assert bodies is not None
-    scene, highest = plan.scene, performance.harmonics_of(plan)
     choices: list[tuple[str, Model, str | None]] = []
-    if model.state is not None:
-        for state in admissible(plan, bodies, Stages()):
-            if not state.same(model.state):
-                try:
-                    choices.append((f"static {state.name}", preloaded(model, state), None))
-                except InputError as error:
-                    log.info("static state %s: %s", state.name, one_line(error))
-    choices += [(f"start {s}", model, s) for s in STARTS if s != scene.balance.slider]
-    for ratio in scene.excitation.centrifugal_to_force:
+    for state in admissible(plan, bodies, Stages()) if model.state is not None else ():
+        if model.state is None or state.same(model.state):
+            continue
+        try:
+            choices.append((f"static {state.name}", preloaded(model, state), None))
+        except InputError as error:
+            log.info("static state %s: %s", state.name, one_line(error))
+    choices += [(f"start {s}", model, s) for s in STARTS if s != plan.scene.balance.slider]
+    for ratio in plan.scene.excitation.centrifugal_to_force:
         for choice, other, start in choices:
-            point = plan, other, ratio, highest, start
-            yield _Work(
-                partial(_into_band, solution, name, choice),
-                performance.peaks_at,
-                point,
-                needed=True,
-            )
+            into = partial(_into_band, solution, name, choice)
+            point = plan, other, ratio, start
+            yield _Work(into, performance.peaks_at, point, needed=True)
 
 
 def _into_band(solution: ForcedSolution, name: str, choice: str, point: RatioPoint) -> None:

@@ -59,16 +59,12 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceStiffne
 
     A contact analysis stands for the right one and, mirrored, for the symmetric rig's left.
     """
-    law = _law(choice, stages) if choice.from_contact else None
-    out: dict[Side, FaceStiffness] = {}
-    for side in SIDES:
-        given = choice.face(side)
-        if given is None:
-            assert law is not None
-            K_T = float(law.k_t.sum(axis=0).mean())
-            given = FaceStiffness(float(law.k_n.sum()), K_T)
-        out[side] = given
-    return out
+    given = {side: choice.face(side) for side in SIDES}
+    if not choice.from_contact:
+        return {side: one for side, one in given.items() if one is not None}
+    law = _law(choice, stages)
+    found = FaceStiffness(float(law.k_n.sum()), float(law.k_t.sum(axis=0).mean()))
+    return {side: one or found for side, one in given.items()}
 
 
 def check_sources(scene: ForcedScene) -> None:
@@ -167,9 +163,9 @@ def _law(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
 
 
 def _first(groups: Mapping[str, Group], where: str) -> Group:
-    for group in groups.values():
-        if group.attributes.get("content") == "contact law":
-            return group
+    laws = (one for one in groups.values() if one.attributes.get("content") == "contact law")
+    if (found := next(laws, None)) is not None:
+        return found
     raise InputError(
         f'stiffness: {where} holds no contact law; run the contact with "contact_law" among want'
     )
@@ -193,21 +189,14 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
 def _run(scene: Scene) -> Group:
     flat = analysis_of(scene)
     solution = flat.solve(flat.make_plan(scene), Stages())
-    for check in flat.check_solution(solution):
-        if not check.passed:
-            log.warning(
-                "contact analysis %s: %s: %s = %.3g, limit %.3g",
-                scene.name,
-                check.name,
-                check.says,
-                check.value,
-                check.limit,
+    for check in (one for one in flat.check_solution(solution) if not one.passed):
+        what = f"{check.name}: {check.says} = {check.value:.3g}, limit {check.limit:.3g}"
+        log.warning("contact analysis %s: %s", scene.name, what)
+        if check.fatal:
+            raise InputError(
+                f"stiffness: the contact analysis {scene.name} failed its check {check.name}; "
+                f"run it alone: upd run {scene.name}"
             )
-            if check.fatal:
-                raise InputError(
-                    f"stiffness: the contact analysis {scene.name} failed its check "
-                    f"{check.name}; run it alone: upd run {scene.name}"
-                )
     return _first(flat.arrays(solution), scene.name)
 
 
@@ -294,23 +283,17 @@ def static_state(
     chosen = c.static if choice is None else choice
     frames = face_frames(bodies)
     if not isinstance(chosen, str):
-        return _given(frames, F, c.friction, chosen)
+        return _checked(StaticState(GIVEN, *_given(frames, F, chosen)), frames, F, c.friction)
     if chosen == SEATED:
         N, T = F * _seated_shares(plan, stages or Stages())
-        return _checked(
-            StaticState(SEATED, N, T, rigid_balance(frames, F, c.friction, "opposing")),
-            frames,
-            F,
-            c.friction,
-        )
+        known = rigid_balance(frames, F, c.friction, "opposing")
+        return _checked(StaticState(SEATED, N, T, known), frames, F, c.friction)
     try:
         known = equilibrium(*face_angles(frames), F, c.friction, chosen)
     except InputError as error:
         raise InputError(f'contact.static: "{chosen}" does not exist here: {error}') from None
-    N, T = (
-        np.array([getattr(known, f"{way}_{side}") for side in SIDES])
-        for way in ("normal", "tangential")
-    )
+    N = np.array([known.normal_left, known.normal_right])
+    T = np.array([known.tangential_left, known.tangential_right])
     return _checked(StaticState(chosen, N, T, known), frames, F, c.friction)
 
 
@@ -333,20 +316,15 @@ def imbalance(frames: Array, F: float, N: Array, T: Array) -> float:
     return float(np.abs(total[[_X, _Z]]).max() / F)
 
 
-def _normals(frames: Array, F: float, ratios: Array) -> Array:
-    """N of both faces from their T/N."""
+def _given(frames: Array, F: float, chosen: Mapping[str, Any]) -> tuple[Array, Array]:
+    """N and T of both faces, from the ratios T/N or the forces that a scene gives."""
+    if not all(isinstance(chosen[side], float) for side in SIDES):
+        N, T = (np.array([chosen[side][letter] for side in SIDES]) for letter in "NT")
+        return N, T
+    ratios = np.array([chosen[side] for side in SIDES])
     A = (frames[:, 0] + ratios[:, None] * frames[:, 2])[:, [_X, _Z]].T
-    return np.asarray(np.linalg.lstsq(A, np.array([0.0, F]), rcond=None)[0])
-
-
-def _given(frames: Array, F: float, mu: float, chosen: Mapping[str, Any]) -> StaticState:
-    """Ratios or forces of both faces that a scene gives."""
-    if all(isinstance(chosen[side], float) for side in SIDES):
-        ratios = np.array([chosen[side] for side in SIDES])
-        N = _normals(frames, F, ratios)
-        return _checked(StaticState(GIVEN, N, N * ratios), frames, F, mu)
-    N, T = (np.array([chosen[side][letter] for side in SIDES]) for letter in "NT")
-    return _checked(StaticState(GIVEN, N, T), frames, F, mu)
+    N = np.linalg.lstsq(A, np.array([0.0, F]), rcond=None)[0]
+    return N, N * ratios
 
 
 def _checked(state: StaticState, frames: Array, F: float, mu: float) -> StaticState:
@@ -382,27 +360,20 @@ def _checked(state: StaticState, frames: Array, F: float, mu: float) -> StaticSt
 def _seated_shares(plan: Plan[ForcedScene], stages: Stages) -> Array:
     """(2, 2) N and T of both faces over F_C after it is raised from nothing.
 
-    Without gaps the contact is homogeneous: the shares do not depend on F_C. Kept on disk.
+    Without gaps the contact is homogeneous: the shares do not depend on F_C.
     """
     plan = _eight_nodes(plan)
-    scene, steps = plan.scene, np.arange(1, _STEPS + 1) / _STEPS
-    path = cache_folder() / f"seated-{_key(scene, plan.parameters)[:32]}.npz"
-    shares = (load_arrays(path) or {}).get("shares")
-    if shares is None or shares.shape != (2, len(SIDES)):
-        with stages("static state", "F_C raised on both faces with friction"):
-            of = make_interface(plan, make_bodies(plan))
-            F = scene.damper.centrifugal
-            try:
-                found = of.seat(scene.contact.friction, F * steps)
-            except ConvergenceError as error:
-                raise InputError(
-                    f'contact.static: "seated" was not solved ({error}); to fix it: '
-                    'contact.static = "frictionless", or T/N of both faces'
-                ) from error
-            totals = of.face_forces(found)[-1] / F
-        shares = totals[:, [0, 2]].T
-        save_arrays(path, {"shares": shares})
-    return np.asarray(shares, float)
+    F, mu = plan.scene.damper.centrifugal, plan.scene.contact.friction
+    with stages("static state", "F_C raised on both faces with friction"):
+        of = make_interface(plan, make_bodies(plan))
+        try:
+            found = of.seat(mu, F * np.arange(1, _STEPS + 1) / _STEPS)
+        except ConvergenceError as error:
+            raise InputError(
+                f'contact.static: "seated" was not solved ({error}); to fix it: '
+                'contact.static = "frictionless", or T/N of both faces'
+            ) from error
+    return np.asarray((of.face_forces(found)[-1] / F)[:, [0, 2]].T)
 
 
 def _eight_nodes(plan: Plan[ForcedScene]) -> Plan[ForcedScene]:
@@ -413,20 +384,6 @@ def _eight_nodes(plan: Plan[ForcedScene]) -> Plan[ForcedScene]:
         scene=replace(scene, mesh=replace(scene.mesh, element="hex8i")),
         parameters={**plan.parameters, "element_nodes": 8, "symmetry": "half"},
         symmetry="half",
-    )
-
-
-def _key(scene: ForcedScene, parameters: Mapping[str, Any]) -> str:
-    m = scene.material
-    return key_of(
-        {
-            "recipe": scene.recipe,
-            "parameters": dict(parameters),
-            "material": (m.E, m.nu),
-            "friction": scene.contact.friction,
-            "steps": _STEPS,
-            "sources": source_digest(scene.recipe),
-        }
     )
 
 

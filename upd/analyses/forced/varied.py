@@ -25,7 +25,7 @@ L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104: the range of data as the s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -279,7 +279,7 @@ def _of_best(
     parts: Mapping[Key, tuple[ErrorPart, ...]],
 ) -> tuple[ErrorPart, ...]:
     """The best F_C/F_E lies between its neighbours on the curve; its peak is as well known as the
-    worst known one of the run's curves, beside what more harmonics change there.
+    worst known one of the run's curves.
     """
     performance = solution.performances[one.case.stiffness]
     best = performance.best
@@ -288,13 +288,11 @@ def _of_best(
     if quantity == q.BEST_RATIO:
         known = [p.ratio for p in performance.known]
         k = known.index(best.ratio)
-        beside = [known[i] / best.ratio for i in (k - 1, k + 1) if 0 <= i < len(known)]
+        beside = [r / best.ratio for r in known[max(k - 1, 0) : k + 2] if r != best.ratio]
         error = max((max(r, 1.0 / r) for r in beside), default=math.nan) - 1.0
         why = "the next F_C/F_E on either side"
         return (ErrorPart("points of the curve", error, why),) if beside else ()
-    of, what = q.PEAK_ACCELERANCE, "height"
-    if quantity == q.BEST_FREQUENCY:
-        of, what = q.PEAK_FREQUENCY, "frequency"
+    of = q.PEAK_FREQUENCY if quantity == q.BEST_FREQUENCY else q.PEAK_ACCELERANCE
     mine = [
         found
         for (name, case), found in parts.items()
@@ -306,11 +304,6 @@ def _of_best(
         return ()
     worst = max(mine, key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
-    if performance.again is not None:
-        few, more = (getattr(p.worst, what, math.nan) for p in performance.again)
-        basis = f"change with the harmonics of the run, at F_C/F_E {best.ratio:.3g}"
-        out = [part for part in out if part.source != HARMONICS]
-        out.append(ErrorPart(HARMONICS, abs(more / few - 1.0), basis))
     if quantity == q.BEST_REDUCTION and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]
@@ -522,16 +515,12 @@ def _contact_report(
     return finest_report(scene, [nameless(one) for one in solved], names)
 
 
-def _titled(words: str) -> Callable[[ForcedScene, str], str]:
-    """Titles with the load of a ladder."""
-
-    def title(scene: ForcedScene, vary: str) -> str:
-        return f"{words.format(vary)}, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
-
-    return title
+def _title(scene: ForcedScene, vary: str) -> str:
+    """With the load."""
+    what = "springs and whole faces" if vary == "contact" else f"what accuracy costs, {vary}"
+    return f"{what}, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
 
 
-_title = _titled("what accuracy costs, {}")
 _march = partial(_base, method="march")
 _on_levels = partial(Ladder, follow=_NUMBERS, report=finest_report, title=_title)
 _on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, title=_title)
@@ -559,6 +548,6 @@ LADDERS: Mapping[str, Ladder] = {
         _NUMBERS,
         _contact_report,
         _contact_notes,
-        _titled("springs and whole faces"),
+        _title,
     ),
 }
