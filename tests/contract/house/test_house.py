@@ -317,7 +317,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 11761,
+    "analyses": 11368,
     "hbm": 6281,
     "contact": 3532,
     "linalg": 2716,
@@ -333,7 +333,7 @@ ROOM_LINES = {
     "cli": 825,
     "measured": 883,
     "reduction": 1116,
-    "results": 787,
+    "results": 779,
     "fem": 728,
     "matrices": 616,
     "root": 532,
