@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import math
 import resource
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses import make_plan
 from upd.analyses.forced.curves import QUARTER, point_limit
+from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.statics import face_laws
+from upd.analyses.seated.bodies import make_bodies
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
+from upd.progress import Stages
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.scene.ranges import with_values
 from upd.sizing.choice import BestDamper
-from upd.sizing.ranges import InputRange, RigPeaks
+from upd.sizing.ranges import InputRange, bare
 from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -137,7 +144,7 @@ def grid_scene(found: BestDamper) -> ForcedScene:
             "excitation.force": [f"{f!r} N" for f in sorted(set(forces))],
             "excitation.centrifugal_to_force": FROM_FORCE,
             # between coarser ones peaks are read too high or lost
-            "excitation.points": max(_fine_points(rig) for _, rig in found.best.rigs),
+            "excitation.points": max(_fine_points(*rig) for rig in rig_models(found)),
             "want": ["response"],
             "contact.stiffness": [found.stiffness],
             "left_out.solve": "no",
@@ -147,9 +154,21 @@ def grid_scene(found: BestDamper) -> ForcedScene:
     )
 
 
-def _fine_points(rig: RigPeaks) -> int:
+def rig_models(found: BestDamper) -> Iterator[tuple[ForcedPlan, Model]]:
+    """The rigs of the optimum again."""
+    ranges = found.ranges
+    for w, _ in found.best.rigs:
+        given = zip((*ranges.shapes, *ranges.unsure), (*found.best.values, *w), strict=True)
+        values = {of.path: of.text(value) for of, value in given}
+        scene = bare(with_values(ranges.scene, values) if values else ranges.scene, found.stiffness)
+        plan: ForcedPlan = make_plan(scene)
+        laws = face_laws(scene.stiffnesses[found.stiffness], Stages())
+        yield plan, make_model(plan, make_bodies(plan), laws)
+
+
+def _fine_points(plan: ForcedPlan, model: Model) -> int:
     """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
-    e, limit = rig.scene.excitation, point_limit(rig.plan, rig.model, True)
+    e, limit = plan.scene.excitation, point_limit(plan, model, True)
     modes, width = limit.modes, limit.width
     inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
     if not inside.size:

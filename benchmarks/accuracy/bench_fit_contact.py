@@ -123,7 +123,7 @@ def recovered(damper: Damper, made: FitResponses) -> Iterator[dict[str, Any]]:
             "value": float(abs(np.exp(found[0].end[k]) / damper.factors[k] - 1.0)),
             "unit": "",
             "reference": EXACT,
-            "note": f"{made.source.made} models",
+            "note": f"{made.made} models",
         }
 
 

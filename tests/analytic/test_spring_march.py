@@ -164,7 +164,7 @@ def test_an_explicit_march_of_all_modes_stays_at_the_motion(
     f, force, model = 405.0, 2.0, solution.models["thesis"]
     springs = make_springs(solution.plan, model)
     at = springs.at_rest()
-    mine = settle(InterfaceMarch(springs.march, f, [force], 128), at, 1e-4, 1000)
+    mine = settle(InterfaceMarch(springs.march, f, [force], 256), at, 1e-4, 1000)
     assert mine.settled
     assert (mine.last.counts > 0.05).all()
     full = explicit.explicit_march(model, 0.005)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.fitting.residuals import SHOWN, CurveNoise, FurtherMeasurement, Knowledge, Start, is_bent
-from upd.fitting.targets import CurveTarget, FitTarget, VariedInput, fitted_scene
+from upd.fitting.residuals import SHOWN, FittedCurve, FurtherMeasurement, Knowledge, Start, is_bent
+from upd.fitting.targets import FitTarget, VariedInput, fitted_scene
 from upd.plot.chart import Axis, Band, Chart, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
@@ -40,32 +40,6 @@ _MEMBERS = 5
 _SIZE = (6.4, 4.6)
 #: reach of the tangents in ln(factor)
 _REACH = 0.05
-
-
-@dataclass(frozen=True)
-class FittedCurve:
-    """A measured curve and the fitted one.
-
-    Attributes
-    ----------
-    target : CurveTarget
-        What was measured.
-    noise : CurveNoise
-        How well it is taken to be known.
-    computed : ndarray
-        (n,) of the first answer, complex or magnitudes, (m/s2)/N.
-    """
-
-    target: CurveTarget
-    noise: CurveNoise
-    computed: NDArray[np.complex128]
-
-    @property
-    def off(self) -> float:
-        """Root of the mean square of the differences, over that of the measured values."""
-        H = self.target.curve.accelerance
-        computed = self.computed if self.target.curve.is_complex else np.abs(self.computed)
-        return float(np.linalg.norm(computed - H) / np.linalg.norm(H))
 
 
 @dataclass(frozen=True, repr=False)
@@ -207,10 +181,10 @@ class Fit(FigureAnswer):
             out.append(f"The misfit is not quadratic within the interval of {', '.join(bent)}.")
         out += [
             f"{one.target.name}: residuals of neighbouring points are correlated "
-            f"({one.noise.correlation:+.2f}, limit {one.noise.limit:.2f}): the model lacks "
+            f"({one.correlation:+.2f}, limit {one.limit:.2f}): the model lacks "
             "something that the curve has, and intervals are too narrow."
             for one in self.measured
-            if not one.noise.white
+            if not one.white
         ]
         ended = sum(math.isfinite(one.misfit) for one in self.starts)
         out.append(
@@ -231,7 +205,7 @@ class Fit(FigureAnswer):
 def _farthest(found: Fit) -> str:
     """The target that is off most."""
     off = [abs(_off(found, i)) for i in range(len(found.targets))]
-    rms = [one.noise.rms for one in found.measured]
+    rms = [one.rms for one in found.measured]
     if max(rms, default=0.0) > max(off, default=0.0):
         one = found.measured[int(np.argmax(rms))]
         return f"{one.target.name} {100.0 * one.off:.2g} % off, {max(rms):.2g} half-widths"
@@ -267,7 +241,7 @@ def _interval_note(found: Fit) -> str:
     if not found.widths:
         of = "all sets that meet the targets" if own else f"targets off by {100.0 * _OFF:g} %"
         return f"From and to: {kind.lower()}, of {of}."
-    if any(one.noise.estimated for one in found.measured):
+    if any(one.estimated for one in found.measured):
         return f"{kind}, 95 % intervals."
     return f"{kind}, in the same multiple of standard deviations as the targets' half-widths."
 
@@ -296,12 +270,12 @@ def _targets(found: Fit) -> AnswerTable:
         of = curve.target.curve
         values = f"{len(of.frequency)} {'complex' if of.is_complex else 'magnitudes'}"
         off = Rounded(100.0 * curve.off, ".2g", "{} % rms")
-        rows.append((curve.target.name, "(m/s2)/N", values, "", off, _half_width(curve.noise)))
+        rows.append((curve.target.name, "(m/s2)/N", values, "", off, _half_width(curve)))
     heads = ("target", "unit", "#wanted", "#fitted", "#off", "half-width")
     return AnswerTable("Targets", heads, tuple(rows))
 
 
-def _half_width(noise: CurveNoise) -> str:
+def _half_width(noise: FittedCurve) -> str:
     """Of a curve."""
     parts = [f"{100.0 * noise.relative:.2g} %"] if noise.relative else []
     parts += [f"{noise.constant:.2g}"] if noise.constant else []

@@ -12,7 +12,7 @@ ones estimated from what the fit leaves.
 With residuals r of N values and p inputs, the noise sigma^2 = (a |H|)^2 + b^2 follows by
 `upd.measured.damping` and the half-width is t sigma, t of Student's distribution with N - p degrees
 of freedom at 95 %. It holds for independent errors: what the curve has and the model has not makes
-neighbouring residuals alike, and `CurveNoise.correlation` shows it.
+neighbouring residuals alike, and `FittedCurve.correlation` shows it.
 
 J = dr/dz at the answer shows what is known: with the singular values s and right singular vectors w
 of J diag(high - low), a share t of the room along w_i moves the residuals by s_i t. The covariance
@@ -43,7 +43,7 @@ import itertools
 import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -113,7 +113,7 @@ class Residuals:
 
     Attributes
     ----------
-    curves : list of CurveNoise
+    curves : list of FittedCurve
         What the weights of the measured curves are made of.
     """
 
@@ -195,7 +195,7 @@ class Residuals:
         """What a residual without half-width may be off: where contacts are solved again or peaks
         are climbed, their own error.
         """
-        steps = [step**2 for step in self.responses.source.steps if step > STEP]
+        steps = [step**2 for step in self.responses.steps if step > STEP]
         followed = [CLIMBED] if self.responses.targets.ratios else []
         return max([ROUNDING, *steps, *followed])
 
@@ -273,15 +273,19 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class CurveNoise:
-    """How well a measured curve is taken to be known.
+class FittedCurve:
+    """A measured curve, how well it is taken to be known, and the fitted one.
 
     Attributes
     ----------
+    target
+        What was measured.
     relative, constant
         Half-width of a part: of the value, and (m/s2)/N.
     estimated
         Whether from the residuals of the fit.
+    computed
+        (n,) of the answer, complex or magnitudes, (m/s2)/N; empty before a fit.
     correlation
         Of residuals of neighbouring points over their half-widths, 0 for independent errors.
     limit
@@ -292,9 +296,11 @@ class CurveNoise:
         Whether the residuals are no more than what the model itself is off.
     """
 
+    target: CurveTarget
     relative: float
     constant: float
     estimated: bool
+    computed: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, complex))
     correlation: float = 0.0
     limit: float = 1.0
     rms: float = 0.0
@@ -305,14 +311,21 @@ class CurveNoise:
         """Whether the residuals may be independent errors, or are rounding."""
         return self.rounding or abs(self.correlation) <= self.limit
 
+    @property
+    def off(self) -> float:
+        """Root of the mean square of the differences, over that of the measured values."""
+        H = self.target.curve.accelerance
+        computed = self.computed if self.target.curve.is_complex else np.abs(self.computed)
+        return float(np.linalg.norm(computed - H) / np.linalg.norm(H))
 
-def first_noise(target: CurveTarget) -> CurveNoise:
+
+def first_noise(target: CurveTarget) -> FittedCurve:
     """Before any fit: as stated, else each point by its own size."""
     if target.stated:
-        return CurveNoise(target.relative or 0.0, target.constant or 0.0, False)
+        return FittedCurve(target, target.relative or 0.0, target.constant or 0.0, False)
     # down to where differences of the highest are rounding
     floor = float(np.finfo(float).eps ** 0.5 * target.curve.magnitude.max())
-    return CurveNoise(1.0, floor, True)
+    return FittedCurve(target, 1.0, floor, True)
 
 
 def as_complex(target: CurveTarget, parts: Array) -> NDArray[np.complex128]:
@@ -325,7 +338,7 @@ def as_complex(target: CurveTarget, parts: Array) -> NDArray[np.complex128]:
 
 def noise_after(
     target: CurveTarget, parts: Array, unknowns: float, free: int, least: float
-) -> CurveNoise:
+) -> FittedCurve:
     """From what a fit leaves.
 
     Parameters
@@ -340,7 +353,8 @@ def noise_after(
         Part of a value that the model itself is off.
     """
     r = (parts - target.values).reshape(target.parts, -1)
-    size = np.abs(as_complex(target, parts))
+    computed = as_complex(target, parts)
+    size = np.abs(computed)
     if target.stated:
         relative, constant = target.relative or 0.0, target.constant or 0.0
     else:
@@ -353,8 +367,17 @@ def noise_after(
     limit = 3.0 / np.sqrt(u.size)
     rms = float(np.sqrt(square / u.size))
     left = float(np.linalg.norm(r) / np.linalg.norm(size))
-    stated = target.stated
-    return CurveNoise(relative, constant, not stated, near, float(limit), rms, left <= least)
+    return FittedCurve(
+        target,
+        relative,
+        constant,
+        not target.stated,
+        computed,
+        near,
+        float(limit),
+        rms,
+        left <= least,
+    )
 
 
 # -- what the targets leave unknown, and what to measure next --------------------------------------

@@ -67,144 +67,6 @@ _CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
 _FRICTIONLESS = "frictionless"
 
 
-class ModelSource:
-    """Models of a scene with its inputs moved.
-
-    Parameters
-    ----------
-    scene
-        Of contact points on springs.
-    parameters
-        Of the fit.
-    ratios
-        F_C/F_E of what is followed with friction; without any the static state is omitted (a
-        stuck point is as stiff under any preload).
-    like
-        Of the same scene: its blades are taken.
-
-    Raises
-    ------
-    InputError
-        For a scene of whole faces, one that chooses its levels by an accuracy, parameters of
-        several contact stiffnesses, and harmonics that are no number.
-    """
-
-    def __init__(
-        self,
-        scene: ForcedScene,
-        parameters: Sequence[VariedInput],
-        ratios: Sequence[float] = (),
-        like: ModelSource | None = None,
-    ) -> None:
-        self.scene, self.parameters, self.ratios = scene, tuple(parameters), tuple(ratios)
-        paths = [path for one in parameters for path in one.paths]
-        self.stiffness = stiffness_of(scene, paths)
-        one_model(scene, self.stiffness, "a fit")
-        #: models made
-        self.made = 0
-        self._stages = Stages()
-        self._plans: dict[str, ForcedPlan] = {}
-        self._bodies: dict[str, Bodies] = {} if like is None else like._bodies
-        self._models: dict[str, Model] = {}
-        self._tangents: int | None = None
-        seated = bool(ratios) and is_seated(scene)
-        #: inputs that make new blades, or a new static state, with every evaluation
-        self.dear = [
-            p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
-        ]
-        contact = scene.stiffness[self.stiffness].scene
-        self._contact = contact if any(p.startswith("geometry.") for p in paths) else None
-        #: of the differences of every parameter
-        self.steps = [
-            CONTACT_STEP
-            if self._contact and any(p.startswith("geometry.") for p in one.paths)
-            else STEP
-            for one in self.parameters
-        ]
-
-    @property
-    def cheap(self) -> bool:
-        """Whether every evaluation re-uses the same reduced blades."""
-        return not self.dear
-
-    @property
-    def cost(self) -> str:
-        """Which inputs make an evaluation slow; "" where none does."""
-        why = "every value makes new blades or a new static state"
-        return f"{', '.join(self.dear)}: {why}" if self.dear else ""
-
-    def at(self, z: Array) -> tuple[ForcedPlan, Model]:
-        """The model with moved inputs, and its plan.
-
-        Parameters
-        ----------
-        z
-            (n,) logarithms of the parameters' factors.
-
-        Raises
-        ------
-        InputError
-            Where the scene refuses the parameters.
-        """
-        return self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
-
-    def totals(self, z: Array) -> dict[Side, FaceStiffness]:
-        """Contact stiffness of both faces."""
-        scene = self.bare(fitted_scene(self.scene, self.parameters, z))
-        return face_laws(scene.stiffnesses[self.stiffness], self._stages)
-
-    @property
-    def directions(self) -> str:
-        """What contact.directions has to say in a fitted scene to give its numbers: those chosen
-        first; "" where the scene's own word does.
-        """
-        auto = self.scene.contact.directions == "auto"
-        return _DIRECTIONS[self._tangents] if auto and self._tangents is not None else ""
-
-    def bare(self, scene: ForcedScene) -> ForcedScene:
-        """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
-        solved again; a contact scene with the rig's geometry.
-        """
-        one = one_model(scene, self.stiffness, "a fit")
-        contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
-        if self._tangents is not None:
-            contact = replace(contact, directions=_DIRECTIONS[self._tangents])
-        if self.ratios:
-            excitation = replace(excitation, centrifugal_to_force=self.ratios, force=())
-        else:
-            contact = replace(contact, fit="unloaded")
-        if self._contact:
-            stiffness[self.stiffness] = replace(
-                stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
-            )
-        return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
-
-    def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Model]:
-        self.made += 1
-        frame = self._frame(scene)
-        plan = _remembered(self._plans, frame, lambda: make_plan(scene))
-        plan = replace(plan, scene=scene)
-        bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
-        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
-        if frame in self._models:
-            return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
-        # small matrices once the blades are reduced
-        with threads_for(1) if bodies.reduced else nullcontext():
-            model = make_model(plan, bodies, laws)
-        model = _remembered(self._models, frame, lambda: model)
-        if self._tangents is None and scene.contact.directions == "auto":
-            # once chosen they stay: numbers would jump
-            self._tangents = model.contacts.tangents if bodies.half else None
-        return plan, model
-
-    def _frame(self, scene: ForcedScene) -> str:
-        contact = replace(scene.contact, directions="auto")
-        if not self.ratios or contact.static == _FRICTIONLESS:
-            # what the points carry at rest does not depend on it
-            contact = replace(contact, friction=self.scene.contact.friction)
-        return repr(replace(scene, stiffness={}, text="", contact=contact))
-
-
 def is_seated(scene: ForcedScene) -> bool:
     """Whether friction changes the state at rest."""
     return scene.contact.loaded and scene.contact.static == "seated"
@@ -373,7 +235,9 @@ def _point(b: Balance, answer: FrequencyResponse, ratio: float, f: float) -> Arr
 
 
 class FitResponses:
-    """Targets of a fit as functions of its parameters.
+    """Targets of a fit as functions of its parameters, and the models of the scene with its inputs
+    moved. Without targets with friction the static state is omitted: a stuck point is as stiff
+    under any preload.
 
     Parameters
     ----------
@@ -391,7 +255,8 @@ class FitResponses:
     Raises
     ------
     InputError
-        As `ModelSource` does.
+        For a scene of whole faces, one that chooses its levels by an accuracy, parameters of
+        several contact stiffnesses, and harmonics that are no number.
     """
 
     def __init__(
@@ -405,11 +270,30 @@ class FitResponses:
         like: FitResponses | None = None,
     ) -> None:
         self.scene, self.targets, self.parameters = scene, targets, tuple(parameters)
-        self.source: ModelSource = ModelSource(
-            scene, parameters, targets.ratios, None if like is None else like.source
-        )
-        self.cheap = self.source.cheap
-        self.stiffness = self.source.stiffness
+        paths = [path for one in parameters for path in one.paths]
+        self.stiffness = stiffness_of(scene, paths)
+        one_model(scene, self.stiffness, "a fit")
+        #: models made
+        self.made = 0
+        self._stages = Stages()
+        self._plans: dict[str, ForcedPlan] = {}
+        self._bodies: dict[str, Bodies] = {} if like is None else like._bodies
+        self._models: dict[str, Model] = {}
+        self._tangents: int | None = None
+        seated = bool(targets.ratios) and is_seated(scene)
+        #: inputs that make new blades, or a new static state, with every evaluation
+        self.dear = [
+            p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
+        ]
+        contact = scene.stiffness[self.stiffness].scene
+        self._contact = contact if any(p.startswith("geometry.") for p in paths) else None
+        #: of the differences of every parameter
+        self.steps = [
+            CONTACT_STEP
+            if self._contact and any(p.startswith("geometry.") for p in one.paths)
+            else STEP
+            for one in self.parameters
+        ]
         self._journal, self._needed = journal, needed
         self._solved_once = False
         self._found: dict[bytes, tuple[Array, Array]] = {}
@@ -418,6 +302,88 @@ class FitResponses:
             self._found[z.tobytes()] = value, slope.reshape(len(value), len(z))
         #: F_C/F_E -> peaks, and Hz at which the accelerance is asked for
         self.friction = {ratio: _asked(ratio, targets) for ratio in targets.ratios}
+
+    @property
+    def cheap(self) -> bool:
+        """Whether every evaluation re-uses the same reduced blades."""
+        return not self.dear
+
+    @property
+    def cost(self) -> str:
+        """Which inputs make an evaluation slow; "" where none does."""
+        why = "every value makes new blades or a new static state"
+        return f"{', '.join(self.dear)}: {why}" if self.dear else ""
+
+    def model(self, z: Array) -> tuple[ForcedPlan, Model]:
+        """The model with moved inputs, and its plan.
+
+        Parameters
+        ----------
+        z
+            (n,) logarithms of the parameters' factors.
+
+        Raises
+        ------
+        InputError
+            Where the scene refuses the parameters.
+        """
+        return self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
+
+    def totals(self, z: Array) -> dict[Side, FaceStiffness]:
+        """Contact stiffness of both faces."""
+        scene = self.bare(fitted_scene(self.scene, self.parameters, z))
+        return face_laws(scene.stiffnesses[self.stiffness], self._stages)
+
+    @property
+    def directions(self) -> str:
+        """What contact.directions has to say in a fitted scene to give its numbers: those chosen
+        first; "" where the scene's own word does.
+        """
+        auto = self.scene.contact.directions == "auto"
+        return _DIRECTIONS[self._tangents] if auto and self._tangents is not None else ""
+
+    def bare(self, scene: ForcedScene) -> ForcedScene:
+        """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
+        solved again; a contact scene with the rig's geometry.
+        """
+        one = one_model(scene, self.stiffness, "a fit")
+        contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
+        if self._tangents is not None:
+            contact = replace(contact, directions=_DIRECTIONS[self._tangents])
+        if self.targets.ratios:
+            excitation = replace(excitation, centrifugal_to_force=self.targets.ratios, force=())
+        else:
+            contact = replace(contact, fit="unloaded")
+        if self._contact:
+            stiffness[self.stiffness] = replace(
+                stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
+            )
+        return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
+
+    def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Model]:
+        self.made += 1
+        frame = self._frame(scene)
+        plan = _remembered(self._plans, frame, lambda: make_plan(scene))
+        plan = replace(plan, scene=scene)
+        bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
+        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
+        if frame in self._models:
+            return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
+        # small matrices once the blades are reduced
+        with threads_for(1) if bodies.reduced else nullcontext():
+            model = make_model(plan, bodies, laws)
+        model = _remembered(self._models, frame, lambda: model)
+        if self._tangents is None and scene.contact.directions == "auto":
+            # once chosen they stay: numbers would jump
+            self._tangents = model.contacts.tangents if bodies.half else None
+        return plan, model
+
+    def _frame(self, scene: ForcedScene) -> str:
+        contact = replace(scene.contact, directions="auto")
+        if not self.targets.ratios or contact.static == _FRICTIONLESS:
+            # what the points carry at rest does not depend on it
+            contact = replace(contact, friction=self.scene.contact.friction)
+        return repr(replace(scene, stiffness={}, text="", contact=contact))
 
     def at(self, z: Array) -> tuple[Array, Array]:
         """The numbers, then the points of the curves, and their derivatives.
@@ -450,12 +416,12 @@ class FitResponses:
     def value(self, z: Array) -> Array:
         """(m,) without derivatives."""
         z = np.asarray(z, float)
-        return self._evaluate(z, *self.source.at(z))
+        return self._evaluate(z, *self.model(z))
 
     def solved_at(self, z: Array) -> tuple[Array, Array]:
         value = self.value(z)
         slope = np.zeros((len(value), len(self.parameters)))
-        for k, step in enumerate(self.source.steps):
+        for k, step in enumerate(self.steps):
             slope[:, k] = (self._moved(z, k, step) - value) / step
             if not self._needed:
                 below = (value - self._moved(z, k, -step)) / step
@@ -486,7 +452,7 @@ class FitResponses:
                 try:
                     if one.of in CONTACT_TOTALS:
                         side, which = CONTACT_TOTALS[one.of]
-                        v = float(getattr(self.source.totals(z)[side], which))
+                        v = float(getattr(self.totals(z)[side], which))
                     elif one.ratio is None:
                         v = _of_limits(plan, one.of, limit, peaks)
                     else:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import ConvergenceError, InputError
-from upd.fitting.answer import Fit, FittedCurve, Status
+from upd.fitting.answer import Fit, Status
 from upd.fitting.residuals import (
     KEPT,
     ROUNDING,
@@ -132,11 +132,11 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         # a target that is not there is an error before anything is sought
         responses.at(np.zeros(len(parameters)))
     count = starts or (_FEW if not responses.cheap else _SOME if targets.ratios else _STARTS)
-    if responses.source.cost:
-        progress("fit", responses.source.cost, 0.0)
+    if responses.cost:
+        progress("fit", responses.cost, 0.0)
 
     def report(text: str, seconds: float | None) -> None:
-        progress("fit", f"{text}, {responses.source.made} models", seconds)
+        progress("fit", f"{text}, {responses.made} models", seconds)
 
     with stages("fit", f"{targets.count} values, {len(parameters)} parameters, {count} starts"):
         done = settled(residuals, search(residuals, count, report))
@@ -154,10 +154,8 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         responses.stiffness,
         targets.numbers,
         tuple(
-            FittedCurve(one, noise, as_complex(one, value[part]))
-            for one, noise, part in zip(
-                targets.curves, residuals.curves, residuals.parts, strict=True
-            )
+            replace(one, computed=as_complex(one.target, value[part]))
+            for one, part in zip(residuals.curves, residuals.parts, strict=True)
         ),
         parameters,
         status,
@@ -168,8 +166,8 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         ends,
         further,
         done,
-        responses.source.directions,
-        responses.source.made,
+        responses.directions,
+        responses.made,
         math.nan,
     )
 

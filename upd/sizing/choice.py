@@ -18,8 +18,8 @@ from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene.rotation import damper_mass
-from upd.sizing.ranges import FORCE, TURNING, InputRange, Ranges, RigPeaks
-from upd.sizing.worst_peak import SLOPE_STEP, LowestWorst, WorstPeak, reached
+from upd.sizing.ranges import FORCE, TURNING, InputRange, Ranges
+from upd.sizing.worst_peak import SLOPE_STEP, LowestWorst, PeaksOver, WorstPeak, reached
 
 Array = NDArray[np.float64]
 #: what is minimised: peaks per newton of F_E, accelerations
@@ -51,7 +51,7 @@ class Tried:
     ----------
     values : tuple of float
         In the units inside; empty where nothing else is chosen.
-    rigs : tuple of (tuple of float, RigPeaks)
+    rigs : tuple of (tuple of float, PeaksOver)
         Values of the uncertain inputs -> their rig.
     worst, best : WorstPeak, LowestWorst
         Worst peaks over all ranges, and where they are least.
@@ -62,7 +62,7 @@ class Tried:
     """
 
     values: tuple[float, ...]
-    rigs: tuple[tuple[tuple[float, ...], RigPeaks], ...]
+    rigs: tuple[tuple[tuple[float, ...], PeaksOver], ...]
     worst: WorstPeak
     best: LowestWorst
     plain: WorstPeak
@@ -77,7 +77,7 @@ def best_of(tried: Iterable[Tried]) -> Tried:
 
 def curves_of(tried: Iterable[Tried]) -> int:
     """Whole curves that were solved for them in this call."""
-    return sum(rig.curves for one in tried for _, rig in one.rigs)
+    return sum(rig.solved for one in tried for _, rig in one.rigs)
 
 
 def nominal_of(tried: Iterable[Tried]) -> Tried:
@@ -188,7 +188,7 @@ class BestDamper(FigureAnswer):
     @property
     def resumed(self) -> int:
         """Points kept of earlier calls."""
-        return sum(rig.peaks.resumed for one in self.tried for _, rig in one.rigs)
+        return sum(rig.resumed for one in self.tried for _, rig in one.rigs)
 
     @property
     def outcome(self) -> tuple[str, str]:
@@ -452,7 +452,7 @@ def _unsure(found: BestDamper, one: InputRange) -> Sensitivity:
     best, ranges = found.best, found.ranges
     k = ranges.unsure.index(one)
     c, weight = best.best.log_centrifugal, best.worst.weight
-    heights = {w: WorstPeak([rig.peaks], ranges.forces, weight).read(c) for w, rig in best.rigs}
+    heights = {w: WorstPeak([rig], ranges.forces, weight).read(c) for w, rig in best.rigs}
     worst = max(heights, key=lambda w: heights[w])
     line = sorted((w[k], y) for w, y in heights.items() if is_along(w, worst, k))
     values, y = np.array(line).T
@@ -553,7 +553,7 @@ def _over_ratio(found: BestDamper) -> Chart:
     traces: list[Trace] = []
     for w, rig in best.rigs:
         word = "".join(f", {of.shown(v)}" for of, v in zip(found.ranges.unsure, w, strict=True))
-        points = {s: peaks for s, peaks in rig.peaks.points.items() if peaks}
+        points = {s: peaks for s, peaks in rig.points.items() if peaks}
         for name in dict.fromkeys(name for peaks in points.values() for name in peaks):
             solved = sorted((s, p[name][1]) for s, p in points.items() if name in p)
             x, y = np.exp(np.array(solved)).T

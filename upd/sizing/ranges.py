@@ -13,7 +13,7 @@ from typing import Any
 
 from upd.analyses import make_plan
 from upd.analyses.forced.curves import point_limit
-from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.model import make_model
 from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import face_laws, static_state
@@ -266,7 +266,13 @@ def bare(scene: ForcedScene, stiffness: str) -> ForcedScene:
     return replace(one_model(scene, stiffness, "a choice", more=more), want=("response",))
 
 
-class RigPeaks:
+def rig_peaks(
+    scene: ForcedScene,
+    ends: tuple[float, float],
+    bodies: dict[str, Bodies],
+    stages: Stages,
+    report: Callable[[str], None],
+) -> PeaksOver:
     """The peaks of one rig.
 
     Parameters
@@ -282,55 +288,29 @@ class RigPeaks:
     report
         Called with words before every solution.
     """
-
-    def __init__(
-        self,
-        scene: ForcedScene,
-        ends: tuple[float, float],
-        bodies: dict[str, Bodies],
-        stages: Stages,
-        report: Callable[[str], None],
-    ) -> None:
-        self.scene, self._report, self.curves = scene, report, 0
-        (self.stiffness,) = scene.contact.stiffness
-        plan: ForcedPlan = make_plan(scene)
-        self.plan = plan
-        key = bodies_key(plan)
-        if key not in bodies:
-            with stages("blades", "mesh and assembly"):
-                bodies[key] = make_bodies(self.plan)
-        with stages("blades", "static state and reduction"):
-            laws = face_laws(scene.stiffnesses[self.stiffness], stages)
-            state = static_state(self.plan, bodies[key], stages=stages)
-            self.model: Model = make_model(self.plan, bodies[key], laws, state)
-        e = scene.excitation
-        with threads_for(len(self.model.M)):
-            stuck = point_limit(plan, self.model, True).peaks("right", grid(plan))
-        if not stuck:
-            raise InputError(
-                f"no stuck peak of the right blade between {e.start:g} and {e.stop:g} Hz; to "
-                "fix it: widen excitation.start and stop"
-            )
-        kept = Journal(f"choice-{self._key()[:32]}")
-        low, high = map(math.log, ends)
-        self.peaks = PeaksOver(self._curve_at, low, high, kept=kept)
-
-    def _key(self) -> str:
-        one = replace(
-            self.scene,
-            text="",
-            name="",
-            title="",
-            excitation=replace(self.scene.excitation, force=(), centrifugal_to_force=()),
+    (stiffness,) = scene.contact.stiffness
+    plan: ForcedPlan = make_plan(scene)
+    key, e = bodies_key(plan), scene.excitation
+    if key not in bodies:
+        with stages("blades", "mesh and assembly"):
+            bodies[key] = make_bodies(plan)
+    with stages("blades", "static state and reduction"):
+        laws = face_laws(scene.stiffnesses[stiffness], stages)
+        state = static_state(plan, bodies[key], stages=stages)
+        model = make_model(plan, bodies[key], laws, state)
+    with threads_for(len(model.M)):
+        stuck = point_limit(plan, model, True).peaks("right", grid(plan))
+    if not stuck:
+        raise InputError(
+            f"no stuck peak of the right blade between {e.start:g} and {e.stop:g} Hz; to fix it: "
+            "widen excitation.start and stop"
         )
-        return key_of({"scene": repr(one), "sources": source_digest(self.scene.recipe)})
 
-    def _curve_at(self, s: float) -> Peaks | None:
+    def curve_at(s: float) -> Peaks | None:
         """Peaks of the right blade at one F_C/F_E; None where no curve arrives."""
         ratio = math.exp(s)
-        self._report(f"whole curve, F_C/F_E {ratio:.4g}")
-        self.curves += 1
-        found = peaks_at(self.plan, self.model, ratio)
+        report(f"whole curve, F_C/F_E {ratio:.4g}")
+        found = peaks_at(plan, model, ratio)
         if not found.arrived:
             return None
         return {
@@ -338,3 +318,14 @@ class RigPeaks:
             for one in found.peaks
             if one.blade == "right"
         }
+
+    kept = Journal(f"choice-{_key(scene)[:32]}")
+    low, high = map(math.log, ends)
+    return PeaksOver(curve_at, low, high, kept=kept)
+
+
+def _key(scene: ForcedScene) -> str:
+    """Of all that the peaks depend on."""
+    excitation = replace(scene.excitation, force=(), centrifugal_to_force=())
+    one = replace(scene, text="", name="", title="", excitation=excitation)
+    return key_of({"scene": repr(one), "sources": source_digest(scene.recipe)})

@@ -41,9 +41,9 @@ from upd.sizing.choice import (
     nominal_of,
     reaches_of,
 )
-from upd.sizing.ranges import InputRange, Ranges, RigPeaks, bare, read_ranges
+from upd.sizing.ranges import InputRange, Ranges, bare, read_ranges, rig_peaks
 from upd.sizing.statics import DamperDesign, damper_statics
-from upd.sizing.worst_peak import WorstPeak, lowest_worst
+from upd.sizing.worst_peak import PeaksOver, WorstPeak, lowest_worst
 
 log = logging.getLogger(__name__)
 #: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
@@ -298,12 +298,12 @@ class _Search:
             for w in sorted({*corners, own})
         }
         counted = [
-            rig.peaks
+            rig
             for w, rig in rigs.items()
             if all(of.low <= v <= of.high for of, v in zip(r.unsure, w, strict=True))
         ]
         worst = WorstPeak(counted, r.forces, self.weight)
-        plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
+        plain = WorstPeak([rigs[own]], r.nominal_forces, self.weight)
         with self.stages("search", self._words(chosen)):
             best, nominal = (lowest_worst(one, *ends) for one in (worst, plain))
         return Tried(place, tuple(rigs.items()), worst, best, plain, nominal, ends)
@@ -313,14 +313,14 @@ class _Search:
         best, nominal = (lowest_worst(worst, *one.ends) for worst in (one.worst, one.plain))
         return replace(one, best=best, nominal=nominal)
 
-    def _rig(self, given: Inputs, window: tuple[float, float]) -> RigPeaks:
+    def _rig(self, given: Inputs, window: tuple[float, float]) -> PeaksOver:
         words, scene = self._words(given), self._with(given)
 
         def report(text: str) -> None:
             self.progress("peaks", f"{words}: {text}", None)
 
         with self.stages("peaks", words):
-            return RigPeaks(scene, window, self.bodies, self.stages, report)
+            return rig_peaks(scene, window, self.bodies, self.stages, report)
 
     def _with(self, given: Inputs) -> ForcedScene:
         if not given:

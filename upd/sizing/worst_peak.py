@@ -97,6 +97,11 @@ class PeaksOver:
         return True
 
     @property
+    def solved(self) -> int:
+        """Curves of this call."""
+        return len(self.points) - self.resumed
+
+    @property
     def missed(self) -> list[tuple[float, float]]:
         """Between which s nothing is known, for a curve between was not followed through."""
         s = sorted(self.points)

@@ -88,7 +88,7 @@ def test_what_a_curve_leaves_out_is_told_once(
     )
     for _ in range(3):
         made.value(np.zeros(2))
-    assert made.source.made == 3
+    assert made.made == 3
     found = [one for one in caplog.records if "omitted harmonics" in one.getMessage()]
     assert len(found) == 1
 
@@ -128,10 +128,10 @@ def test_noise_is_estimated_and_the_intervals_are_its_own(
     noisy: Fit, data: list[MeasuredCurve]
 ) -> None:
     for one, exact in zip(noisy.measured, data, strict=True):
-        assert one.noise.estimated
-        assert one.noise.white
+        assert one.estimated
+        assert one.white
         # 95 % of the errors lie within it, to three standard deviations of that share of 82 values
-        half = np.hypot(one.noise.relative * exact.magnitude, one.noise.constant)
+        half = np.hypot(one.relative * exact.magnitude, one.constant)
         error = one.target.curve.accelerance - exact.accelerance
         inside = np.abs([error.real, error.imag]) <= half
         assert 0.878 <= inside.mean() <= 1.0

@@ -90,9 +90,8 @@ def test_worst_peaks_are_those_of_runs(
     assert grid.processor_seconds > 0.0
     assert grid.within(found.centrifugal)
     # as many frequencies as the narrowest stuck peak needs, not the scene's 60
-    rig = found.best.rigs[0][1]
-    e = rig.scene.excitation
-    limit = point_limit(rig.plan, rig.model, True)
+    plan, model = next(runs.rig_models(found))
+    e, limit = plan.scene.excitation, point_limit(plan, model, True)
     narrowest = limit.width[(limit.modes > e.start) & (limit.modes < e.stop)].min()
     points = runs.grid_scene(found).excitation.points
     assert points > 60 and 0.24 < (e.stop - e.start) / (points - 1) / narrowest <= 0.25
@@ -218,7 +217,7 @@ def test_uncertain_friction(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert values[:3] == [(0.59,), (0.6,), (0.61,)]
     c = one.best.best.log_centrifugal
     told = next(s for s in sensitivities(one) if s.path.startswith("contact.friction"))
-    y = [WorstPeak([rig.peaks], one.ranges.forces).read(c) for _, rig in one.best.rigs[:3]]
+    y = [WorstPeak([rig], one.ranges.forces).read(c) for _, rig in one.best.rigs[:3]]
     assert one.worst == pytest.approx(math.exp(max(y)), rel=1e-3)
     # here the most friction is the worst
     assert int(np.argmax(y)) == 2
@@ -268,7 +267,7 @@ def test_several_parameters_are_chosen_and_stood(
     corners = [w for w, _ in one.best.rigs]
     assert len(corners) == 5 and {w[1] for w in corners} == {0.0049, 0.005, 0.0051}
     c = one.best.best.log_centrifugal
-    each = [WorstPeak([rig.peaks], one.ranges.forces).read(c) for _, rig in one.best.rigs]
+    each = [WorstPeak([rig], one.ranges.forces).read(c) for _, rig in one.best.rigs]
     assert one.worst == pytest.approx(math.exp(max(each)), rel=1e-3)
     # the slopes told are those to the corners next to the worst
     told = {s.path: s for s in sensitivities(one)}
