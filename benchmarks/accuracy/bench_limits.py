@@ -187,7 +187,7 @@ def modes(name: str, built: Rig) -> Iterator[Row]:
     for count in (MODES[0], READY, MODES[1]):
         fresh = replace(built.bodies, reduced={})
         one = rig(f"{name}-response", fresh, reduction__modes=count)
-        stuck = measures.stuck_modes(one.model, 1000.0)
+        stuck = measures.mode_shapes(one.model, 1000.0).modes
         found[count] = {m.in_phase: m.frequency for m in reversed(stuck)}
     many = found.pop(MODES[1])
     for count, few in found.items():

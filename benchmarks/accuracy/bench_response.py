@@ -276,7 +276,9 @@ def shipped(case: str, name: str, **changes: Any) -> Iterator[Row]:
 
 def stuck_pair(built: Rig) -> dict[bool, float]:
     """Frequencies in Hz of the lowest modes across, by whether the tips move in phase."""
-    return {m.in_phase: m.frequency for m in reversed(measures.stuck_modes(built.model, 1000.0))}
+    return {
+        m.in_phase: m.frequency for m in reversed(measures.mode_shapes(built.model, 1000.0).modes)
+    }
 
 
 def run() -> list[Row]:

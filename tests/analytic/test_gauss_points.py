@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from upd.analyses import make_plan
 from upd.analyses.forced.blade_parts import FacePoints, fewer_rows, gauss_points, lagrange
 from upd.analyses.forced.inputs import elastic_stuck, nearer
-from upd.analyses.forced.measures import stuck_modes
+from upd.analyses.forced.measures import mode_shapes
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import make_bodies
@@ -159,7 +159,7 @@ def _model(arrangement: str, **changes: Any) -> tuple[Model, list[float]]:
     plan = make_plan(scene)
     laws = face_laws(scene.stiffnesses["thesis"], Stages())
     model = make_model(plan, make_bodies(plan), laws)
-    return model, [m.frequency for m in stuck_modes(model, 1500.0)]
+    return model, [m.frequency for m in mode_shapes(model, 1500.0).modes]
 
 
 @pytest.mark.parametrize("arrangement", ["symmetric", "asymmetric"])
@@ -217,7 +217,7 @@ def test_points_on_half_of_each_face_are_the_model_of_a_smaller_patch() -> None:
     held = found.damper_rows[:, 0].T @ N + found.damper_rows[:, -1].T @ T
     assert held == pytest.approx(model.damper.force, abs=1e-6 * np.abs(model.damper.force).max())
     # less tilt stiffness: the stuck modes are lower
-    lower = [m.frequency for m in stuck_modes(half, 1500.0)]
+    lower = [m.frequency for m in mode_shapes(half, 1500.0).modes]
     assert all(a < b for a, b in zip(lower[:2], own[:2], strict=True))
     one_row, _ = _model("symmetric", **{"left_out.solve": "no", "contact.rows": 1})
     assert nearer(one_row, 0.5) is None

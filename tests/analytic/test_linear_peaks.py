@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import Limit, finer, linear_modes
 from upd.hbm import FrequencyResponse, contacts, frequency_response
-from upd.scene.forced_contact import SIDES
 
 C, F = 0.004, 3.0
 ROW = np.array([1.0])
@@ -85,13 +84,6 @@ def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None
     frequency = np.array([300.0, 400.0, 310.0, 1e6])
     # tips of both blades, by mode: in phase, out of phase, across, the light one
     tips = np.array([[1.0, 1.0, 1e-6, 0.0], [1.0, -1.0, 1e-6, 1e3]])
-
-    class Tips:
-        def row(self, side: str) -> NDArray[np.float64]:
-            return tips[SIDES.index(side)]
-
-    model: Any = Tips()
-    values = (2 * np.pi * frequency) ** 2
-    found = measures.shapes_along_x(model, np.eye(4), values, np.eye(4), 1000.0)
+    found = measures.modes_of_tips(np.eye(4), frequency, np.eye(4), tips, 1000.0)
     assert [m.words for m in found.modes] == ["in phase", "out of phase"]
     assert np.array_equal(found.shape, np.eye(4)[:, :2])

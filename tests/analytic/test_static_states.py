@@ -10,7 +10,6 @@ import pytest
 from rigs import LINES
 from scipy.optimize import minimize
 
-from upd.analyses.forced.measures import static_error
 from upd.analyses.forced.model import Model, make_model, preloaded, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.statics import (
@@ -131,6 +130,19 @@ def test_given_ratios_and_forces() -> None:
     pulls = planned("asymmetric", static={"left": 0.6, "right": 0.6})
     with pytest.raises(InputError, match="would have to pull"):
         static_state(pulls, make_bodies(pulls))
+
+
+def static_error(model: Model) -> float:
+    """Largest misfit of the points' static forces and moments on the damper against F_C, relative
+    to it (moments by the damper's arms).
+    """
+    force = np.column_stack([model.contacts.law.preload, model.traction])
+    rows = model.damper_rows[:, : force.shape[1]]
+    total = np.einsum("pdr,pd->r", rows, force)
+    rotation = np.array(model.damper.kept) >= 3
+    arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
+    size = float(np.linalg.norm(model.damper.force))
+    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
 
 
 def test_points_hold_the_damper_in_every_state(rig: tuple[ForcedPlan, Bodies, Model]) -> None:

@@ -69,7 +69,7 @@ def test_weak_force_is_the_stuck_answer(weak: RunResult) -> None:
     assert weak.value("peak_2_frequency", case(weak)) == pytest.approx(
         weak.value("stuck_out_of_phase"), rel=1e-3
     )
-    assert weak.value("points_always_stuck") == weak.value("contact_points")
+    assert weak.value("contact_slip") == weak.value("contact_lift") == 0.0
     assert [c.name for c in weak.checks if not c.passed] == []
 
 
@@ -120,7 +120,7 @@ def test_linear_peaks_do_not_depend_on_the_frequencies_asked_for(points: int) ->
 
 def test_static_forces_are_those_of_the_wedge(weak: RunResult) -> None:
     for side in ("left", "right"):
-        N = weak.value("static_normal", f"{case(weak)}, at peak 2, out of phase, {side}")
+        N = weak.value("static_N", f"thesis, frictionless, {side}")
         assert pytest.approx(350.0 / (2.0 * np.cos(np.pi / 4)), rel=1e-6) == N
 
 
@@ -166,7 +166,6 @@ def test_cases_are_data_and_come_back_from_the_file(weak: RunResult) -> None:
         "points thesis": {"content": "points"} | own,
         "linear thesis": {"content": "linear"} | own,
         "friction thesis, F_C/F_E 100000": {"content": "friction"} | curve,
-        "measured peaks": {"content": "measured"},
     }
     expected = {
         name.replace("100000", f"{1e5:g}"): attributes for name, attributes in expected.items()
@@ -183,7 +182,7 @@ def test_cases_are_data_and_come_back_from_the_file(weak: RunResult) -> None:
     for entry in (*weak.rows, *weak.checks):
         assert entry.case == Case(**entry.case.given())
         assert not entry.case.name or entry.case.name == "performance"
-    sides = {r.case.side for r in weak.rows if r.name == "static_normal"}
+    sides = {r.case.side for r in weak.rows if r.name == "static_N"}
     assert sides == {"left", "right"}
 
 
@@ -196,9 +195,6 @@ def test_charts_need_no_more_than_the_file(weak: RunResult) -> None:
         "Frequency response",
         "Contact state",
         "Hysteresis",
-        "Friction loss",
-        "Damper motion: translation",
-        "Damper motion: rotation",
     ]
 
 
@@ -208,7 +204,6 @@ def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:
         "response.png",
         "contact_state.png",
         "hysteresis.png",
-        "damper_motion.png",
         "summary.json",
     ):
         assert (weak.folder / name).stat().st_size > 1000, name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -72,7 +72,7 @@ class Computed:
 
 def measured_results(
     measured: MeasuredChoices,
-    computed: Callable[[MeasuredChoice], Sequence[Computed]],
+    computed: Callable[[MeasuredChoice], Iterable[Computed]],
     missing: Callable[[MeasuredChoice], str],
     damping: float,
 ) -> list[Result]:

@@ -61,12 +61,6 @@ def friction(f: Any, **more: Variable) -> Group:
             "side",
             "state",
         ),
-        damper_amplitude=values(
-            np.tile([5e-3, 0.0, 1e-3, 0.0, 2e-3, 0.0], (n, 1)),
-            "frequency",
-            "damper_dof",
-            units="mm, rad",
-        ),
         loop_peak=values([1, 2], "loop"),
         loop_side=values([1, 0], "loop"),
         loop_along=values([-0.0, 3.0], "loop", units="mm"),
@@ -100,10 +94,6 @@ def arrays() -> dict[str, Group]:
             accelerance_stuck_left=four,
         ),
         "friction own, F_C per F_E 194": friction(f),
-        "measured peaks": group(
-            {"content": "measured"},
-            frequency=values([340.0], "peak", units="Hz", source="thesis, Table II"),
-        ),
     }
 
 
@@ -111,7 +101,7 @@ def made(arrays: dict[str, Group]) -> dict[tuple[str, str], Chart]:
     return {(c.title, c.case): c for c in forced.ANALYSIS.charts(arrays, {})}
 
 
-def test_responses_show_limits_curves_peaks_and_measurements(arrays: dict[str, Group]) -> None:
+def test_responses_show_limits_curves_and_peaks(arrays: dict[str, Group]) -> None:
     charts = made(arrays)
     right, left = (
         charts["Frequency response", f"{blade} blade, stiffness own"] for blade in ("right", "left")
@@ -125,9 +115,6 @@ def test_responses_show_limits_curves_peaks_and_measurements(arrays: dict[str, G
     assert [t.label for t in left.traces] == ["stuck", "F_C/F_E 194"]
     assert right.traces[2].y == pytest.approx([5.0] * 4)
     assert [(m.y, m.text) for m in right.marks] == [(5.0, f"{290.0 + 20.0 / 3.0:.1f} Hz")]
-    assert [(b.label, b.low, b.high) for b in right.bands] == [
-        ("measured (thesis, Table II)", 340.0, 340.0)
-    ]
     assert (right.x.low, right.x.high, right.detail) == (290.0, 300.0, "damping 0.5 %")
     assert right.y.label == "accelerance, (m/s²)/N" and right.y.log
 
@@ -150,22 +137,6 @@ def test_what_is_unstable_is_dotted_in_the_colour_of_its_ratio(arrays: dict[str,
         "F_C/F_E 194": ("line", 1, [True, True, True, False], "F_C/F_E 194"),
         "F_C/F_E 194, unstable": ("dotted", 1, [False, True, True, True], "F_C/F_E 194"),
     }
-
-
-def test_a_fold_tells_what_a_sweep_up_reaches(arrays: dict[str, Group]) -> None:
-    at = ("fold",)
-    folds = {
-        "fold_frequency": values([297.0, 295.0, 292.0], *at),
-        "fold_up": values([1, 0, 1], *at),
-        "fold_before": values([3.0, 3.0, 4.5], *at),
-        "fold_reached": values([5.0, 5.0, 5.0], *at),
-    }
-    arrays["friction own, F_C per F_E 194"] |= folds
-    right = made(arrays)["Frequency response", "right blade, stiffness own"]
-    # down, and by a tenth, are none
-    assert [(m.x, m.y, m.text) for m in right.marks[1:]] == [
-        (297.0, 3.0, "a sweep up jumps and reaches 5")
-    ]
 
 
 def test_shares_are_stacked_to_the_whole(arrays: dict[str, Group]) -> None:
@@ -247,7 +218,7 @@ def test_a_peak_of_the_sweeps_is_drawn_from_the_march_alone(arrays: dict[str, Gr
         ("hysteresis", f"{peak} 1, in phase"): at,
     }
     # over frequency a sweep has no states of points
-    assert not {"contact_state", "damper_motion"} & {c.figure for c in drawn}
+    assert "contact_state" not in {c.figure for c in drawn}
 
 
 def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Group]) -> None:
@@ -275,10 +246,10 @@ def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Gr
     assert [one["case_fields"]["force_ratio"] for one in both] == [194.0]
 
 
-def test_charts_of_contact_and_damper_open_on_the_lowest_ratio_that_slips(
+def test_charts_of_the_contact_open_on_the_lowest_ratio_that_slips(
     arrays: dict[str, Group],
 ) -> None:
-    """194 slips; 600, first in the scene, slips too; 100 does not."""
+    """194 slips; 600, first in the scene, slips too; 100 does not move."""
     more, stuck = (friction(np.linspace(290.0, 300.0, 4)) for _ in range(2))
     stuck["state"] = values(
         np.tile([1.0, 0.0, 0.0], (4, 4, 1)), "frequency", "contact_point", "state"
@@ -286,10 +257,11 @@ def test_charts_of_contact_and_damper_open_on_the_lowest_ratio_that_slips(
     more.attributes, stuck.attributes = CURVE | {"force_ratio": 600.0}, CURVE | {"force_ratio": 100}
     found = forced.ANALYSIS.charts({"more": more, "stuck": stuck} | arrays, {})
     first = {c.title: c for c in reversed(found)}
-    for title in ("Damper motion: translation", "Contact state", "Hysteresis"):
+    for title in ("Contact state", "Hysteresis"):
         assert first[title].case.startswith("own, F_C/F_E 194"), title
-    cases = [c.case for c in found if c.title == "Damper motion: translation"]
-    assert cases == [f"own, F_C/F_E {ratio}" for ratio in (194, 600, 100)]
+    cases = [c.case for c in found if c.title == "Contact state"]
+    sides = ("left", "right")
+    assert cases == [f"own, F_C/F_E {ratio}, {side} face" for ratio in (194, 600) for side in sides]
 
 
 def test_where_nothing_slides_the_first_curve_stands_for_all(arrays: dict[str, Group]) -> None:
@@ -303,22 +275,6 @@ def test_where_nothing_slides_the_first_curve_stands_for_all(arrays: dict[str, G
     for title, n in (("Contact state", 2), ("Contact points at the peak", 0), ("Hysteresis", 1)):
         cases = [c.case for c in charts.values() if c.title == title]
         assert len(cases) == n and all(case.startswith("own, F_C/F_E 194") for case in cases), title
-
-
-def test_loss_and_motion_carry_their_units_over(arrays: dict[str, Group]) -> None:
-    charts = made(arrays)
-    # Four points of 1 mW.
-    assert charts["Friction loss", ""].traces[0].y == pytest.approx(4.0)
-    translation, rotation = (
-        charts[f"Damper motion: {kind}", "own, F_C/F_E 194"] for kind in ("translation", "rotation")
-    )
-    # What symmetry forbids is not drawn; mm and rad become um and mrad.
-    assert [(t.label, t.y[0]) for t in translation.traces] == [
-        ("x, across the blades", 5.0),
-        ("z, radial", 1.0),
-    ]
-    assert [(t.label, t.y[0]) for t in rotation.traces] == [("about y", 2.0)]
-    assert rotation.y.label == "rotation, first harmonic, mrad"
 
 
 def test_performance_shows_the_highest_peak_single_modes_limits_and_the_best() -> None:

@@ -107,7 +107,6 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     T, N = (found.value(f"static_{k}", "interface, seated, right") for k in "TN")
     assert pytest.approx(0.6 * N, rel=1e-4) == T
     checks = {c.name: c for c in found.checks}
-    assert checks["static balance"].passed
     assert checks["sweep energy"].passed
     group = found.arrays["sweep interface, F_C/F_E 300, sweep up"]
     loss = data(group["energy"])[:, 2]
@@ -121,7 +120,8 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     )
     told = found.value("friction_energy", case)
     assert data(peaks["energy"]).sum() == pytest.approx(told, rel=1e-9)
-    assert 1e3 * data(peaks["power"]).sum() == pytest.approx(found.value("friction_power", case))
+    f = data(peaks["frequency"])[0]
+    assert 1e3 * data(peaks["power"]).sum() == pytest.approx(f * told)
     maps = [c for c in charts(found) if c.figure == "contact_map"]
     for way in ("up", "down"):
         f = found.value("peak_2_frequency", f"interface, F_C/F_E 300, out of phase, sweep {way}")
@@ -143,7 +143,7 @@ def test_the_balance_of_a_small_force_is_the_stuck_response() -> None:
             assert found.value(name, case) == pytest.approx(found.value(name, wanted), rel=rel)
     assert not any(name.startswith("sweep") for name in found.arrays)
     checks = {c.name: c for c in found.checks}
-    assert all(checks[k].passed for k in ("path complete", "balance residual", "energy balance"))
+    assert all(checks[k].passed for k in ("path complete", "energy balance"))
 
 
 def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
@@ -161,11 +161,11 @@ def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
         )
         for method in ("balance", "march")
     )
-    assert balanced.value("share_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
+    assert balanced.value("contact_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
     failed = {c.name for c in (*balanced.checks, *marched.checks) if not c.passed}
     # three harmonics are few
     assert not failed - {"truncation"}
-    assert {c.name for c in balanced.checks} >= {"balance residual", "energy balance"}
+    assert "energy balance" in {c.name for c in balanced.checks}
     path = balanced.arrays["friction interface, F_C/F_E 800"]
     swept = marched.arrays["sweep interface, F_C/F_E 800, sweep up"]
     here, there = (

@@ -317,7 +317,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 11448,
+    "analyses": 11368,
     "hbm": 6244,
     "contact": 3455,
     "linalg": 2713,

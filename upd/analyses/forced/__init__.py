@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.forced import answer, arrays, charts, checks, results, varied
+from upd.analyses.forced import answer, checks, results, varied
 from upd.analyses.forced.solve import ForcedSolution
 from upd.linalg.parallel import threads_for
 from upd.vary.inputs import coarsened_rig
@@ -38,9 +38,9 @@ ANALYSIS = Analysis(
     problem=replace(varied.PROBLEM, make_results=_on_one_thread(results.make_results)),
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     check_solution=_on_one_thread(checks.check_solution),
-    arrays=_on_one_thread(arrays.arrays),
+    arrays=_on_one_thread(results.arrays),
     sizes=_sizes,
-    charts=charts.charts,
+    charts=answer.charts,
     headline=answer.headline,
     ladders=varied.LADDERS,
     answer=answer.answer,

@@ -61,10 +61,9 @@ _MOST_POINTS = 400
 
 def run_curve(curve: PointCurve) -> PointCurve:
     """The curve without its path, which is long: its balance, peaks and tops stay."""
-    answer = curve.answer
-    bare = {f.name: getattr(answer, f.name) for f in fields(answer)}
-    bare = {name: one[:0] for name, one in bare.items() if isinstance(one, np.ndarray)}
-    return replace(curve, accelerance={}, more={}, answer=replace(answer, **bare))
+    found = {f.name: getattr(curve.answer, f.name) for f in fields(curve.answer)}
+    bare: Any = {name: one[:0] for name, one in found.items() if isinstance(one, np.ndarray)}
+    return replace(curve, accelerance={}, more={}, answer=replace(curve.answer, **bare))
 
 
 class Run(NamedTuple):
@@ -326,28 +325,23 @@ OTHER_ROWS = (1.5, 0.7)
 _GAUSS_ROWS, _LATTICE = (4, 8), 3
 #: harmonics that a finer level has more than the run
 MORE_HARMONICS = 2
-#: times the samples of the run
-_MORE_SAMPLES = 2
 
 
 def level_variations(plan: ForcedPlan) -> list[Variation]:
     """Half of the modes, more contact points; more harmonics, more samples; coarser meshes."""
     scene = plan.scene
     modes, highest = scene.reduction.modes, int(scene.balance.harmonics)
-    out = []
-    if modes > 1:
-        few = modes // 2
-        half = (("reduction.modes", few),)
-        out.append(Variation(MODES, f"{few} modes a blade", half, size=modes / few))
-    out += _contact_levels(scene.contact)
-    more = highest + MORE_HARMONICS
+    few, more = modes // 2, highest + MORE_HARMONICS
+    half = (("reduction.modes", few),)
     finer = (("balance.harmonics", more), ("balance.samples", samples(scene, 1, more)))
-    label = f"{MORE_HARMONICS} harmonics more"
-    out.append(Variation(HARMONICS, label, finer, size=highest / more))
-    twice = (("balance.samples", samples(scene, _MORE_SAMPLES)),)
-    label = f"{_MORE_SAMPLES} times the samples"
-    out.append(Variation(SAMPLES, label, twice, size=1.0 / _MORE_SAMPLES))
-    return [*out, *(_coarser(plan, factor) for factor in COARSER)]
+    twice = (("balance.samples", samples(scene, 2)),)
+    return [
+        *([Variation(MODES, f"{few} modes a blade", half, size=modes / few)] if few else []),
+        *_contact_levels(scene.contact),
+        Variation(HARMONICS, f"{MORE_HARMONICS} harmonics more", finer, size=highest / more),
+        Variation(SAMPLES, "2 times the samples", twice, size=0.5),
+        *(_coarser(plan, factor) for factor in COARSER),
+    ]
 
 
 def samples(scene: ForcedScene, factor: int, highest: int = 1) -> int:
@@ -402,17 +396,16 @@ def _contact_levels(contact: FrictionChoice) -> list[Variation]:
 
     Lines that the scene names are a choice of the patch: they have no finer level.
     """
+    row, columns, rows = _LATTICE, 2, list(_GAUSS_ROWS)
     if contact.rule == GAUSS:
-        row, column = int(contact.rows), int(contact.columns)
-        rows = dict.fromkeys(math.ceil(factor * row) for factor in OTHER_ROWS)
-        counts = [(one, column) for one in rows if one != row]
-    else:
-        if lines_named(contact):
-            return []
-        row, counts = _LATTICE, [(rows, 2) for rows in _GAUSS_ROWS]
+        row, columns = int(contact.rows), int(contact.columns)
+        rows = [math.ceil(factor * row) for factor in OTHER_ROWS]
+    elif lines_named(contact):
+        return []
     return [
-        Variation(POINTS, f"{m} x {n} Gauss points", with_gauss(m, n), size=row / m)
-        for m, n in counts
+        Variation(POINTS, f"{m} x {columns} Gauss points", with_gauss(m, columns), size=row / m)
+        for m in dict.fromkeys(rows)
+        if m != row
     ]
 
 
@@ -425,12 +418,12 @@ def count_of(scene: ForcedScene, key: str) -> int:
     return int(scene.geometry.get(key, default))
 
 
-def meshed(scene: ForcedScene) -> tuple[str, ...]:
+def meshed(scene: ForcedScene) -> list[str]:
     """Counts that its mesh is refined by: on the contact too, where the contact points are none of
     its nodes.
     """
     on = _ON_CONTACT[scene.arrangement] if scene.contact.rule == GAUSS else ()
-    return (*OFF_CONTACT, *(key for key in GRADED if on and key.startswith(on)))
+    return [key for key in GRADED if key in OFF_CONTACT or key.startswith(on)]
 
 
 def _rounded(scene: ForcedScene, key: str, count: float) -> int:

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import TOLERANCE, FacesCurve, ForcedCurve, PointCurve, SweptCurve
-from upd.analyses.forced.interface_model import WholeFaces
+from upd.analyses.forced.curves import TOLERANCE, FacesCurve, ForcedCurve, PointCurve
 from upd.analyses.forced.plan import CONFIRMED, excitation_of
 from upd.analyses.forced.solve import ForcedSolution
-from upd.analyses.forced.statics import BALANCE, StaticState
+from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import fit_checks
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.hbm.faces.sweep import SteppedSine
@@ -29,22 +28,15 @@ from upd.scene.forced_contact import SIDES
 #: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
 #: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
 WIDEST_STEP = 0.5
-#: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
-#: the solver's tolerance
+#: largest imbalance of work and losses over a cycle: far above the solver's tolerance
 _BALANCE = 1e-6
 
 
-_REPORT = "report this scene"
 _PERIOD = "|work - damping - friction| / their sum, of a period"
 _PATH = "curves that stopped early, or points that are not periodic"
 _CONFIRMED = "|time integration / harmonic balance - 1| at the peak"
 #: check -> its limit, what its value is, and the remedy, templates
 _RULES: Mapping[str, tuple[float, str, str]] = {
-    "static balance": (
-        BALANCE,
-        "|static contact forces - F_C| / F_C, moments by their arms",
-        _REPORT,
-    ),
     "preloaded contact": (
         0,
         "faces without preload, or whose friction is mobilised everywhere",
@@ -64,19 +56,17 @@ _RULES: Mapping[str, tuple[float, str, str]] = {
         "at {count} points the contact forces do not come back to their start, so that they are no "
         'steady state: balance.slider = "mid", or contact.directions = "one"',
     ),
-    "balance residual, points": (
+    "balance residual": (
         _BALANCE,
         "misfit of contact motion and force at the worst point, evaluated again, relative",
         "that point is off by about this share, beside a contact that changes its state: read the "
         "curve there from its neighbours",
     ),
-    # corrections of Newton's method end at 1e-6 of the unknowns, and their square remains
-    "balance residual, nodes": (
-        1e-6,
-        "misfit of blades' forces, slips and damper's motion of a period, relative",
-        _REPORT,
+    "energy balance, points": (
+        _BALANCE,
+        "|work - viscous loss - friction| / work",
+        "report this scene",
     ),
-    "energy balance, points": (_BALANCE, "|work - viscous loss - friction| / work", _REPORT),
     # slips are weighted with the mean of the forces at the ends of a step: of the step's square
     "energy balance, nodes": (1e-2, _PERIOD, "take more samples: balance.samples"),
     "truncation": (
@@ -122,7 +112,6 @@ _RULES: Mapping[str, tuple[float, str, str]] = {
         "the curves at F_C/F_E {at} ended early, so that a higher peak may be missing: raise "
         "performance.lowest",
     ),
-    "sweep complete": (0, "sweeps that stopped early", "{message}. What was found is kept"),
     "sweep settled": (
         0,
         "of {count} frequencies that did not settle",
@@ -152,19 +141,13 @@ def _check(rule: str, case: Case, value: float, **words: Any) -> Check:
 def check_solution(solution: ForcedSolution) -> list[Check]:
     """All self-checks."""
     checks: list[Check] = []
-    scene = solution.plan.scene
+    scene, models, faces = solution.plan.scene, solution.models, solution.faces
     least = scene.damper.centrifugal / max(scene.excitation.centrifugal_to_force, default=np.inf)
-    for name, model in solution.models.items():
-        if model.state is not None:
-            case = Case(stiffness=name, choice=model.state.name)
-            mu = float(model.contacts.law.mu.max(initial=0.0))
-            checks.append(_check("static balance", case, measures.static_error(model)))
-            checks.append(_preloaded(case, model.state, mu, least))
-    for name, faces in solution.faces.items():
-        case = Case(stiffness=name, choice=faces.state.name)
-        mu = float(faces.march.friction.max(initial=0.0))
-        checks.append(_check("static balance", case, _off_balance(faces)))
-        checks.append(_preloaded(case, faces.state, mu, least))
+    states = {name: (one.state, one.contacts.law.mu) for name, one in models.items()}
+    states |= {name: (one.state, one.march.friction) for name, one in faces.items()}
+    for name, (state, mu) in states.items():
+        if state is not None:
+            checks.append(_preloaded(name, state, float(mu.max(initial=0.0)), least))
     for curve in solution.curves:
         checks += _curve_checks(solution, curve)
     for name, found in solution.performances.items():
@@ -176,7 +159,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     return checks + [one.check(scene.left_out) for one in solution.omissions]
 
 
-def _preloaded(case: Case, state: StaticState, mu: float, least: float) -> Check:
+def _preloaded(stiffness: str, state: StaticState, mu: float, least: float) -> Check:
     """A face that carries nothing, or whose friction is all mobilised, before vibration: the rest
     is below the least F_E of the run, in N.
 
@@ -188,23 +171,28 @@ def _preloaded(case: Case, state: StaticState, mu: float, least: float) -> Check
     what = "every point of a face carries mu N"
     if state.empty:
         what = f"the {' and the '.join(state.empty)} face carries nothing"
+    case = Case(stiffness=stiffness, choice=state.name)
     return _check("preloaded contact", case, float(bool(state.empty) or mobilised), what=what)
 
 
 def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator[Check]:
+    """Whether a curve came to its end, and what its method leaves."""
     e, answer, case = solution.plan.scene.excitation, curve.answer, curve.case
-    if isinstance(answer, SteppedSine):
-        yield from _sweep_checks(curve)
-        return
     yield path_check(curve)
     if curve.empty:
         return
-    if isinstance(answer, InterfaceResponse):
-        yield from check_faces_curve(curve, e.points, excitation_of(e).lowest)
-        return
-    yield _check("balance residual, points", case, measures.residual_error(answer))
-    yield _check("energy balance, points", case, float(np.abs(answer.energy_balance).max()))
-    yield from _integrated(curve)
+    if isinstance(answer, SteppedSine):
+        lost, loss = int((~answer.settled).sum()), _open_energy(answer.energy)[answer.settled]
+        words = {"lost": lost, "count": len(answer.settled)}
+        yield _check("sweep settled", case, float(lost), **words)
+        yield _check("sweep energy", case, float(loss.max(initial=0.0)))
+    elif isinstance(answer, InterfaceResponse):
+        yield from _faces_checks(curve, e.points, excitation_of(e).lowest)
+    else:
+        yield _check("balance residual", case, measures.residual_error(answer))
+        yield _check("energy balance, points", case, float(np.abs(answer.energy_balance).max()))
+        yield from _integrated(curve)
+        yield from _oscillating(curve)
 
 
 def path_check(curve: ForcedCurve[Any]) -> Check:
@@ -232,7 +220,6 @@ def _integrated(curve: PointCurve) -> Iterator[Check]:
             worst.difference,
             **vars(worst),
         )
-    yield from _oscillating(curve)
 
 
 def _oscillating(curve: PointCurve) -> Iterator[Check]:
@@ -256,37 +243,17 @@ def _oscillating(curve: PointCurve) -> Iterator[Check]:
         yield _check("oscillating motion", curve.case, lost, count=len(motions), **words)
 
 
-def _off_balance(faces: WholeFaces) -> float:
-    """Forces of all nodes at rest against F_C, relative to it, turns by their arms."""
-    march = faces.march
-    off = march.columns.T @ faces.start.f - march.load
-    turns = np.array(faces.of.kept) >= 3
-    arm = float(np.abs(march.columns[: march.n, turns]).max(initial=1.0))
-    size = float(np.abs(march.load).max())
-    return float(np.abs(off / np.where(turns, arm, 1.0)).max() / size)
-
-
 def _open_energy(energy: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
     """(n,) what is missing of work (n, 0) and losses (n, 1:) of periods, over their sum."""
     work = np.abs(energy).sum(axis=1)
     return np.abs(energy[:, 0] - energy[:, 1:].sum(axis=1)) / np.where(work > 0.0, work, 1.0)
 
 
-def _sweep_checks(one: SweptCurve) -> Iterator[Check]:
-    """A sweep that came to its end, whose motions settled, and whose energy closes."""
-    found, count = one.answer, len(one.answer.settled)
-    lost, loss = int((~found.settled).sum()), _open_energy(found.energy)[found.settled]
-    stopped = float(found.status == "stopped")
-    yield _check("sweep complete", one.case, stopped, message=found.message)
-    yield _check("sweep settled", one.case, float(lost), lost=lost, count=count)
-    yield _check("sweep energy", one.case, float(loss.max(initial=0.0)))
-
-
 # -- whole faces by harmonic balance ---------------------------------------------------------------
 
 
-def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> Iterator[Check]:
-    """What remains of the equations and of a period's energy, harmonics left out, steps at peaks.
+def _faces_checks(curve: FacesCurve, points: int, harmonic: int) -> Iterator[Check]:
+    """What remains of a period's energy, harmonics left out, steps at peaks.
 
     Parameters
     ----------
@@ -296,9 +263,7 @@ def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> Iterator
         That is read.
     """
     answer, case, highest = curve.answer, curve.case, curve.answer.equations.highest
-    residual = max(one.residual for one in answer.points)
     truncated = max(one.unresolved for one in answer.points)
-    yield _check("balance residual, nodes", case, float(residual))
     yield _check("energy balance, nodes", case, float(_open_energy(answer.energy).max()))
     yield _check("truncation", case, float(truncated), highest=highest, more=highest + 2)
     # the steps beside the right blade's peaks against their widths

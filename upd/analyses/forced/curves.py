@@ -29,14 +29,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import WholeFaces, by_coulomb
 from upd.analyses.forced.measures import Array, ComplexArray, CurvePeak, ModeShapes, StuckMode
 from upd.analyses.forced.model import Model, balance_of
-from upd.analyses.forced.plan import (
-    SAMPLES,
-    Excitation,
-    ForcedPlan,
-    excitation_of,
-    grid,
-    time_steps,
-)
+from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid, time_steps
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -405,13 +398,12 @@ class Limit(NamedTuple):
         tops = np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
         every = [_top(response, f[i - 1], f[i + 1]) for i in tops]
         highest = max([float(a.max(initial=0.0)), *(top for _, top in every)])
-        found = measures.chosen_peaks(
-            [
-                CurvePeak(at, top, int(np.abs(grid - at).argmin()))
-                for at, top in every
-                if top >= measures.PEAKS_ABOVE * highest
-            ]
-        )
+        peaks = [
+            CurvePeak(at, top, int(np.abs(grid - at).argmin()))
+            for at, top in every
+            if top >= measures.PEAKS_ABOVE * highest
+        ]
+        found = sorted(sorted(peaks, key=lambda one: -one.height)[:2])
         if self.shapes is None or not found:
             return [peak._replace(number=k) for k, peak in enumerate(found, 1)]
         motion = self.moved(np.array([one.frequency for one in found]))
@@ -634,15 +626,14 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
     ratio
         F_C/F_E.
     """
-    b, force = plan.scene.balance, plan.scene.damper.centrifugal / ratio
-    excitation = excitation_of(plan.scene.excitation)
+    force, excitation = plan.scene.damper.centrifugal / ratio, excitation_of(plan.scene.excitation)
     found = interface_response(
         faces.march,
         grid(plan),
         force * excitation.drive,
         faces.start,
         harmonics=plan.scene.balance.harmonics,
-        samples=SAMPLES if b.samples == "auto" else b.samples,
+        samples=time_steps(plan.scene),
         fallback=by_coulomb,
     )
     moved = {k: found.amplitude[:, k] for k in excitation.harmonics}

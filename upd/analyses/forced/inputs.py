@@ -17,12 +17,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag, eigh
+from scipy.linalg import block_diag
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
 from upd.analyses.forced.curves import Top, stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, StuckMode, shapes_along_x
+from upd.analyses.forced.measures import CurvePeak, StuckMode, mode_shapes
 from upd.analyses.forced.model import Array, Model, balance_of, preloaded
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.seated.bodies import Bodies
@@ -260,13 +260,12 @@ def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckM
     .. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5 (inertia
            relief).
     """
-    M, _, K, B = model.linear(stuck=False)
+    _, _, K, B = model.linear(stuck=False)
     k = stuck_stiffness(model.contacts).ravel()
     G = elastic_compliance(plan, bodies, model)
     # (k^-1 + G)^-1, also where k = 0
     joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
-    values, shapes = eigh(K + B.T @ joint @ B, M)
-    return shapes_along_x(model, M, values, shapes, 2.0 * plan.scene.excitation.stop).modes
+    return mode_shapes(model, 2.0 * plan.scene.excitation.stop, K + B.T @ joint @ B).modes
 
 
 def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:

@@ -455,7 +455,7 @@ def state_at(
     force
         F_E, N.
     """
-    drive = force * model.excitation.at_start
+    drive = force * model.excitation.drive.real.sum(axis=1)
     march, h, contact = springs.march, b.harmonics, b.period(x)
     omega, k = 2.0 * np.pi * frequency, h.dynamic
     flat = contact.coefficients(b.Q).reshape(1, len(b.Psi), h.size)

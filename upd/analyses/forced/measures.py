@@ -29,13 +29,8 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: mm to m
 _M = 1e-3
-_TINY = float(np.finfo(float).tiny)
 #: peaks lower than this part of the highest are not reported
 PEAKS_ABOVE = 0.1
-#: relative difference of frequency below which two peaks are one: about a half-power width
-SAME_PEAK = 5e-3
-#: rigid motions of a damper
-MOTIONS = 6
 
 
 @dataclass(frozen=True)
@@ -141,19 +136,6 @@ class CurvePeak(NamedTuple):
     blade: Side | Literal[""] = ""
 
 
-def chosen_peaks(maxima: Sequence[CurvePeak]) -> list[CurvePeak]:
-    """The two highest of some maxima by rising frequency; a path that turns round passes the same
-    peak again.
-    """
-    out = sorted(maxima, key=lambda peak: -peak.height)
-    once = [
-        p
-        for k, p in enumerate(out)
-        if not any(abs(p.frequency / q.frequency - 1.0) < SAME_PEAK for q in out[:k])
-    ]
-    return sorted(once[:2])
-
-
 def path_maxima(
     frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE, *, between: bool = True
 ) -> list[CurvePeak]:
@@ -187,68 +169,48 @@ def path_maxima(
 
 
 def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
-    """Hysteresis loops of the contact points that lose most.
+    """Hysteresis loops at a point of a path, as `largest_loops`; empty without friction."""
+    b, x = answer.balance, answer.x[i]
+    if not b.contacts.tangents:
+        return []
+    motion = b.split(x)[0] @ b.E.T
+    return largest_loops(
+        answer.energy[i], motion[:, 1:], b.period(x).force, b.contacts.law.mu, count
+    )
+
+
+def largest_loops(
+    loss: Array, motion: Array, force: Array, friction: Array, count: int
+) -> list[Loop]:
+    """Hysteresis loops of the contact points that lose most, each along its main sliding direction.
 
     Parameters
     ----------
-    i
-        Point of the path.
+    loss
+        (n_point,) per cycle, N mm.
+    motion, force
+        (n_point, tangents, n) mm along a cycle, and (n_point, 1 + tangents, n) N.
+    friction
+        (n_point,) mu.
     count
         Loops at most; of points that lose the same, as mirror images do, one.
 
     Returns
     -------
     list of Loop
-        The largest loss first; empty without friction.
+        The largest loss first.
     """
-    b = answer.balance
-    if not b.contacts.tangents:
-        return []
-    x = answer.x[i]
-    force, motion = b.period(x).force, b.split(x)[0] @ b.E.T
-    out = []
-    for p in losing_most(answer.energy[i], count):
-        limit = b.contacts.law.mu[p] * force[p, 0]
-        loss = float(answer.energy[i, p])
-        out.append(loop_along_main(int(p), motion[p, 1:], force[p, 1:], limit, loss))
-    return out
-
-
-def losing_most(loss: Array, count: int) -> NDArray[np.int64]:
-    """Contact points that lose most, the largest first; of those that lose the same, one.
-
-    Parameters
-    ----------
-    loss
-        (n_point,) per cycle, N mm.
-    count
-        Points at most.
-    """
-    order = np.argsort(-loss)
+    order, out = np.argsort(-loss), []
     falling = loss[order]
     rounding = np.sqrt(np.finfo(float).eps) * falling[0]
     own = np.append(True, np.diff(falling) < -rounding) & (falling >= rounding)
-    return np.asarray(order[own][:count])
-
-
-def loop_along_main(point: int, motion: Array, traction: Array, limit: Array, loss: float) -> Loop:
-    """A loop along the point's main sliding direction.
-
-    Parameters
-    ----------
-    point
-        Its number.
-    motion, traction
-        (tangents, n) mm and N.
-    limit
-        (n,) mu N, N.
-    loss
-        N mm.
-    """
-    w = motion - motion.mean(axis=1, keepdims=True)
-    main = np.linalg.svd(w, full_matrices=False)[0][:, 0]
-    main *= np.sign(main[np.argmax(np.abs(main))])
-    return Loop(point, main @ motion, main @ traction, limit, loss)
+    for p in order[own][:count]:
+        w = motion[p] - motion[p].mean(axis=1, keepdims=True)
+        main = np.linalg.svd(w, full_matrices=False)[0][:, 0]
+        main *= np.sign(main[np.argmax(np.abs(main))])
+        limit = friction[p] * force[p, 0]
+        out.append(Loop(int(p), main @ motion[p], main @ force[p, 1:], limit, float(loss[p])))
+    return out
 
 
 def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[Array, Array]:
@@ -289,19 +251,6 @@ def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array
     return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])
 
 
-def static_error(model: Model) -> float:
-    """Largest misfit of the points' static forces and moments on the damper against F_C, relative
-    to it (moments by the damper's arms).
-    """
-    force = np.column_stack([model.contacts.law.preload, model.traction])
-    rows = model.damper_rows[:, : force.shape[1]]
-    total = np.einsum("pdr,pd->r", rows, force)
-    rotation = np.array(model.damper.kept) >= 3
-    arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
-    size = float(np.linalg.norm(model.damper.force))
-    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
-
-
 def residual_error(answer: FrequencyResponse) -> float:
     """Largest misfit along the path of the balance itself, evaluated again, relative.
 
@@ -311,7 +260,7 @@ def residual_error(answer: FrequencyResponse) -> float:
     b, worst = answer.balance, 0.0
     for f, x, kept in zip(answer.frequency, answer.x, answer.contact_force, strict=True):
         off = np.abs(b.force(x) - kept).max()
-        forces = off / max(float(np.abs(kept).max()), _TINY)
+        forces = off / max(float(np.abs(kept).max()), np.finfo(float).tiny)
         worst = max(worst, b.misfit(x, float(2.0 * np.pi * f)), float(forces))
     return worst
 
@@ -366,31 +315,16 @@ class ModeShapes:
     modes: list[StuckMode]
 
 
-def stuck_modes(model: Model, below: float) -> list[StuckMode]:
-    """The stuck modes along x below ``below`` Hz."""
-    return mode_shapes(model, below).modes
-
-
-def mode_shapes(model: Model, below: float) -> ModeShapes:
-    """The stuck modes along x below ``below`` Hz, of the blades with the damper on its springs."""
-    M, _, K, _ = model.linear(stuck=True)
-    return shapes_along_x(model, M, *eigh(K, M), below)
-
-
-def shapes_along_x(
-    model: Model, M: Array, values: Array, shapes: Array, below: float
-) -> ModeShapes:
-    """Of eigenpairs of the blades with the damper those along x.
+def mode_shapes(model: Model, below: float, stiffness: Array | None = None) -> ModeShapes:
+    """The stuck modes along x below ``below`` Hz, of the blades with the damper on its springs.
 
     Parameters
     ----------
-    M
-        (n, n) of the dofs of both blades and the damper.
-    values, shapes
-        (n,) squared angular frequencies, rising, and (n, n) modes, orthonormal in M.
-    below
-        Hz; modes above are left out.
+    stiffness
+        (n, n) of their dofs, in place of that with every point sticking.
     """
+    M, _, K, _ = model.linear(stuck=True)
+    values, shapes = eigh(K if stiffness is None else stiffness, M)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
     return modes_of_tips(M, np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi), shapes, tips, below)
 

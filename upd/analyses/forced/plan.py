@@ -33,9 +33,6 @@ from upd.scene.forced import ExcitationChoice, combined_forces
 from upd.scene.forced_contact import GAUSS, SIDES, Side
 
 Array = NDArray[np.float64]
-#: harmonics of the blades and samples in a period where the scene leaves them to the rule: two
-#: more harmonics change peaks by up to 0.5 %, twice the samples by 0.05 %
-HARMONICS, SAMPLES = 3, 128
 #: checks of omitted effects; each solves a number again with the effect
 ALONG = "sliding along y"
 CONFIRMED = "confirmed by time integration"
@@ -55,7 +52,8 @@ _PERIODS, _MARCH_S, _MARCH_POINT_S = 150.0, 1.2e-6, 4e-8
 _CLOSER, _MARCHED, _DOF_S, _ITERATIONS, _MOVED_S, _MATRICES = 130.0, 3.2e4, 2e-7, 250.0, 8e-7, 10.0
 # Figures, files and page.
 _FILES_S = 5.0
-#: time steps in a period of a time integration where the scene names none
+#: time steps in a period where the scene names none: of whole faces twice as many change peaks by
+#: 0.05 %
 MARCH_SAMPLES = 128
 
 
@@ -76,9 +74,14 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     again = _AROUND * (cost.seconds + cost.shared)
     again *= solves and (scene.estimates or scene.left_out.solves)
     cost.seconds += again
-    effects = effects_of_faces(scene) if whole else effects_of_points(scene)
     return ForcedPlan.of(
-        cost, parameters["symmetry"], parameters, effects, needs, _FILES_S, estimate_seconds=again
+        cost,
+        parameters["symmetry"],
+        parameters,
+        effects_of(scene),
+        needs,
+        _FILES_S,
+        estimate_seconds=again,
     )
 
 
@@ -93,9 +96,8 @@ def _add_whole_faces(cost: CostModel, scene: ForcedScene) -> None:
         solved = 2.0 * curves * _CLOSER * math.log(e.stop / e.start)
         cost.seconds += solved * _MARCHED * _DOF_S * m
     else:
-        samples = SAMPLES if scene.balance.samples == "auto" else int(scene.balance.samples)
         slides = scene.contact.friction > 0.0
-        cost.seconds += _ITERATIONS * curves * samples * slides * _MOVED_S * m
+        cost.seconds += _ITERATIONS * curves * time_steps(scene) * slides * _MOVED_S * m
     cost.kept_bytes += _MATRICES * 8.0 * m**2
 
 
@@ -144,7 +146,7 @@ def _add_curves(cost: CostModel, scene: ForcedScene) -> None:
 
 
 def time_steps(scene: ForcedScene) -> int:
-    """Steps in a period of every march."""
+    """Steps in a period of every march, and samples of whole faces by the balance."""
     given = scene.balance.samples
     return MARCH_SAMPLES if given == "auto" else int(given)
 
@@ -173,47 +175,46 @@ def grid(plan: ForcedPlan) -> Array:
 # -- what is simulated and left out ----------------------------------------------------------------
 
 
-def effects_of_points(scene: ForcedScene) -> list[Effect]:
-    """Of contact by springs at points."""
-    b, elastic = scene.balance, ELASTIC if scene.left_out.solves else ""
-    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
-    fit = "the faces fit each other"
+def effects_of(scene: ForcedScene) -> list[Effect]:
+    """All of them, of springs at points or of all nodes of both faces."""
+    even = "rig, load and contact are even about y = 0: an even motion excites no odd one"
+    whole = scene.mesh.symmetry == "full"
     return [
-        friction_effect(scene, "; a curve stuck everywhere is answered linearly"),
-        _along(scene),
-        *_motion_and_excitation(scene),
-        Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
-        Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
-        Effect.either(
-            "blades spread by F_C",
-            not scene.contact.loaded,
-            f"{fit} without load",
-            f"{fit} under F_C, worn in",
-        ),
-        Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
-        _harmonics(scene, f"0 to {b.harmonics}; {samples} samples", CONFIRMED),
-        Effect(
-            "damper elasticity", False, "in the contact stiffness; the body moves rigidly", elastic
-        ),
-        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
+        *(_of_faces(scene) if scene.contact.model == "interface" else _of_points(scene)),
+        Effect.either("motion odd about y = 0", whole, "the full model", even),
+        Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x"),
+        Effect("lift-off", True, "every point of the contact may open"),
+        Effect("static balance", True, _static_words(scene)),
+        Effect("damper inertia", True, "mass and inertia from its mesh"),
         *centrifugal_effects(scene),
     ]
 
 
-def effects_of_faces(scene: ForcedScene) -> list[Effect]:
-    """Of contact by all nodes of both faces."""
+def _of_points(scene: ForcedScene) -> list[Effect]:
+    """Contact by springs at points."""
+    b, elastic = scene.balance, ELASTIC if scene.left_out.solves else ""
+    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
+    fit, spread = "the faces fit each other", "blades spread by F_C"
+    loaded, rigid = scene.contact.loaded, "in the contact stiffness; the body moves rigidly"
+    return [
+        friction_effect(scene, "; a curve stuck everywhere is answered linearly"),
+        _along(scene),
+        Effect.either(spread, not loaded, f"{fit} without load", f"{fit} under F_C, worn in"),
+        _harmonics(scene, f"0 to {b.harmonics}; {samples} samples", CONFIRMED),
+        Effect("damper elasticity", False, rigid, elastic),
+        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
+    ]
+
+
+def _of_faces(scene: ForcedScene) -> list[Effect]:
+    """Contact by all nodes of both faces."""
     balanced = f"0 to {scene.balance.harmonics} of the blades; contact and damper in time"
     return [
         friction_effect(scene),
         Effect("normal and tangential coupling", True, "solved together at every step in time"),
-        *_motion_and_excitation(scene),
-        Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "its deformation follows its forces statically"),
-        Effect("damper inertia", True, "mass and inertia from its mesh"),
         worn_effect(scene),
-        Effect("static balance", True, _static_words(scene), "static balance"),
         _harmonics(scene, balanced, "truncation"),
-        *centrifugal_effects(scene),
     ]
 
 
@@ -221,16 +222,6 @@ def _harmonics(scene: ForcedScene, balanced: str, check: str) -> Effect:
     if scene.balance.method == "march":
         return Effect("harmonics", True, "all: time integration")
     return Effect("harmonics", True, balanced, check)
-
-
-def _motion_and_excitation(scene: ForcedScene) -> list[Effect]:
-    """Motion that the half model does not have; which blades the excitation acts on."""
-    even = "rig, load and contact are even about y = 0: an even motion excites no odd one"
-    whole = scene.mesh.symmetry == "full"
-    return [
-        Effect.either("motion odd about y = 0", whole, "the full model", even),
-        Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x"),
-    ]
 
 
 def _static_words(scene: ForcedScene) -> str:
@@ -294,19 +285,9 @@ class Excitation:
         return np.asarray(self.drive[:, self.lowest - 1])
 
     @property
-    def at_start(self) -> NDArray[np.float64]:
-        """(L,) forces at t = 0 over F_E."""
-        return np.asarray(self.drive.real.sum(axis=1))
-
-    @property
     def free_blades(self) -> tuple[Side, ...]:
         """Those that move without a damper, in the harmonic that is read."""
         return tuple(side for side, a in zip(self.blades, self.read, strict=True) if a != 0.0)
-
-    @property
-    def usual(self) -> bool:
-        """Whether F_E on the right blade is all of it."""
-        return self.blades == ("right",) and self.drive.tolist() == [[1.0]]
 
     @property
     def words(self) -> str:

@@ -1,35 +1,44 @@
-"""ForcedSolution -> the flat list of numbers, beside what was printed and measured."""
+"""ForcedSolution -> the flat list of numbers, beside what was printed and measured, and all arrays
+for result.nc: curves, linear limits, contact points, states, energies, loops, peaks over F_C/F_E.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from upd.analyses import base, measured
-from upd.analyses.forced import measures
+from upd.analyses.forced import measures, performance
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, Limit, faces_limit, point_limit
-from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.curves import ForcedCurve, Limit, LinearCurves, faces_limit, point_limit
+from upd.analyses.forced.measures import CurvePeak, Loop
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
-from upd.analyses.measured import FREE, STUCK, Computed
+from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper, marched_loops
+from upd.analyses.measured import FREE, STUCK, Computed, accelerance_array
 from upd.analyses.seated.bodies import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
 from upd.reference.printed import Lookup, Printed
-from upd.results import Case, Result
+from upd.results import Case, Group, Result, variable
 from upd.results import quantities as q
 from upd.results.quantities import quantity_of
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.measured import MeasuredChoice
+
+Variables = dict[str, Any]
+#: what the groups of result.nc hold, their attribute ``content``
+POINTS, LINEAR, FRICTION = "points", "linear", "friction"
+PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
+MODES = "nonlinear mode"
+#: loops kept of a peak
+N_LOOPS = 4
 
 
 def make_results(solution: ForcedSolution) -> list[Result]:
@@ -43,11 +52,13 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += curve_results(solution, curve)
     results = _with_measured_peaks(solution, results)
     results += solution.band
-    for name, performance in solution.performances.items():
-        results += performance_results(name, performance)
-    for curve_of_mode in solution.nonlinear_modes:
-        results += mode_results(curve_of_mode)
-    return results + solution.effects + measured_results(solution)
+    for name, found in solution.performances.items():
+        results += performance.performance_results(name, found)
+    for mode in solution.nonlinear_modes:
+        results += performance.mode_results(mode)
+    scene, beside = solution.plan.scene, (partial(_computed, solution), partial(_nothing, solution))
+    results += solution.effects
+    return results + measured.measured_results(scene.measured, *beside, scene.excitation.damping)
 
 
 def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
@@ -78,17 +89,6 @@ def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
             yield of.of(values[k], at, known, source, exact=state.name != "seated")
 
 
-def measured_results(solution: ForcedSolution) -> list[Result]:
-    """Every measured curve beside the computed ones of its blade and state."""
-    scene = solution.plan.scene
-    return measured.measured_results(
-        scene.measured,
-        lambda choice: list(_computed(solution, choice)),
-        lambda choice: _nothing(solution, choice),
-        scene.excitation.damping,
-    )
-
-
 def _nothing(solution: ForcedSolution, choice: MeasuredChoice) -> str:
     """Why nothing stands beside a measured curve."""
     if choice.state is not None:
@@ -105,24 +105,25 @@ def _nothing(solution: ForcedSolution, choice: MeasuredChoice) -> str:
 
 
 def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Computed]:
-    """The computed curves of the blade and state of a measured one."""
-    side, scene = choice.blade, solution.plan.scene
-    if choice.state is not None:
-        stuck = choice.state == STUCK
-        if not stuck and side not in excitation_of(scene.excitation).free_blades:
-            return
-        for name, linear in solution.linear.items():
-            told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
-            case = Case(stiffness=name, kind=choice.state, blade=side)
-            band = (scene.excitation.start, scene.excitation.stop)
-            read = partial(_limit(solution, name, stuck).accelerance, side)
-            yield Computed(case, band, read, told)
-        return
+    """The computed curves of the blade and state of a measured one: linear limits, or with friction
+    between their points by straight lines.
+    """
+    side, e, stuck = choice.blade, solution.plan.scene.excitation, choice.state == STUCK
+    moves = stuck or (choice.state == FREE and side in excitation_of(e).free_blades)
+    for name, linear in solution.linear.items() if moves else ():
+        peaks = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
+        case = Case(stiffness=name, kind=choice.state or "", blade=side)
+        read = partial(_limit(solution, name, stuck).accelerance, side)
+        yield Computed(case, (e.start, e.stop), read, peaks)
     # as the labels of curves tell them apart
-    wanted = f"{choice.centrifugal_to_force:.6g}"
+    wanted = "" if choice.state else f"{choice.centrifugal_to_force:.6g}"
     for c in solution.curves:
         if f"{c.ratio:.6g}" == wanted and len(c.frequency) >= LEAST_POINTS:
-            yield _with_friction(c, side)
+            way = slice(None) if c.frequency[-1] > c.frequency[0] else slice(None, None, -1)
+            f, H = c.frequency[way], c.accelerance[side][way]
+            band, case = (float(f.min()), float(f.max())), replace(c.case, blade=side)
+            read = partial(on_path, frequency=f, values=H)
+            yield Computed(case, band, read, c.peaks.get(side, ()))
 
 
 def _limit(solution: ForcedSolution, name: str, stuck: bool) -> Limit:
@@ -133,20 +134,69 @@ def _limit(solution: ForcedSolution, name: str, stuck: bool) -> Limit:
     return point_limit(plan, solution.models[name], stuck)
 
 
-def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
-    """A curve with friction, between its points by straight lines."""
-    f, H = c.frequency, c.accelerance[side]
-    way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    f, H, band = f[way], H[way], (float(f.min()), float(f.max()))
-    case = replace(c.case, blade=side)
-    return Computed(case, band, lambda at: on_path(at, f, H), c.peaks.get(side, ()))
+# -- the contact ----------------------------------------------------------------------------------
+
+
+class Contact(NamedTuple):
+    """What the contact does at n points of a curve, whichever way that was found.
+
+    Attributes
+    ----------
+    at
+        Number, mode and place of the peaks among the points.
+    frequency
+        (n,) Hz.
+    state, energy
+        (n, n_point, 3) shares of the cycle in stick, slip and open; (n, n_point) losses in a cycle,
+        N mm.
+    motion
+        (n, 6) of the damper, mean and amplitude, mm and rad; None where it is not kept.
+    loops
+        Number of a peak, and a loop; read once.
+    """
+
+    at: Sequence[tuple[int, str, int]]
+    frequency: Array
+    state: Array
+    energy: Array
+    motion: Sequence[Array] | Array | None = None
+    loops: Iterable[tuple[int, Loop]] = ()
+
+
+def contact_of(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Contact | None:
+    """At all points of a path, at the peaks of a sweep whose last periods are kept; else None."""
+    a, f = curve.answer, curve.frequency
+    if isinstance(a, FrequencyResponse):
+        at, model = solution.marked_points(curve), solution.models[curve.stiffness]
+        motion = measures.damper_motion(a, model)
+        loops = ((k, one) for k, _, i in at for one in measures.loops(a, i, N_LOOPS))
+        return Contact(at, f, a.state, a.energy, motion, loops)
+    if isinstance(a, InterfaceResponse):
+        state = np.array([one.nodes for one in a.points])[:, :, [1, 2, 0]]
+        loss = np.array([one.loss for one in a.points])
+        return Contact(solution.marked_points(curve), f, state, loss)
+    peaks = [one for one in curve.peaks["right"] if one.number in curve.periods]
+    if not peaks:
+        return None
+    periods = [curve.periods[one.number] for one in peaks]
+    return Contact(
+        [(one.number, one.mode, i) for i, one in enumerate(peaks)],
+        f[[one.sample for one in peaks]],
+        np.array([one.share for one in periods]),
+        # of a half model each node stands for its image too
+        np.array([one.copies * one.loss for one in periods]),
+        np.stack([marched_damper(solution, curve, one) for one in periods], axis=1),
+        (
+            (one.number, loop)
+            for one in peaks
+            for loop in marched_loops(solution, curve, curve.periods[one.number], N_LOOPS)
+        ),
+    )
 
 
 # -- numbers of curves -----------------------------------------------------------------------------
 
 
-#: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
-MEASURED_PEAK = q.FREE_PEAK_FREQUENCY.name
 #: by how much lower than the peak a sweep ends that is reported
 _LOWER = 0.01
 
@@ -156,9 +206,9 @@ def _more_harmonics(curve: ForcedCurve[Any]) -> Iterator[Result]:
     for k, H in curve.more.items() if not curve.empty else ():
         for blade in SIDES[::-1]:
             f, size = curve.frequency, np.abs(H[blade])
-            top = max(measures.path_maxima(f, size), key=lambda p: p.height, default=None)
             i = int(size.argmax())
-            at, height = (float(f[i]), float(size[i])) if top is None else top[:2]
+            tops = measures.path_maxima(f, size) or [CurvePeak(float(f[i]), float(size[i]), i)]
+            at, height, *_ = max(tops, key=lambda top: top.height)
             yield q.HARMONIC_FREQUENCY.on(blade).of(at, curve.case, n=k)
             yield q.HARMONIC_ACCELERANCE.on(blade).of(height, curve.case, n=k)
 
@@ -181,48 +231,34 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
         *_folds(curve),
         *_more_harmonics(curve),
     ]
-    if isinstance(curve.answer, InterfaceResponse):
-        results.append(q.PATH_JUMPS.of(len(curve.answer.jumps), case))
+    contact = None if curve.empty else contact_of(solution, curve)
     for peak in curve.peaks.get("right", ()):
         results.append(q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number))
-        results += _at_peak(solution, curve, peak)
+        results += _at_peak(solution, curve, contact, peak)
     return results
 
 
 def _at_peak(
-    solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak
+    solution: ForcedSolution, curve: ForcedCurve[Any], contact: Contact | None, peak: CurvePeak
 ) -> Iterator[Result]:
-    """The contact at a peak, its losses and the damper's motion: of a path by the balance, of the
-    last period of a sweep; of the whole contact where only that is known.
+    """The contact at a peak, its losses and the damper's motion; of a sweep whose last period is
+    not kept the shares and losses of the whole.
     """
-    scene, answer, i = solution.plan.scene, curve.answer, peak.sample
+    answer, wants = curve.answer, solution.plan.scene.wants
     at = replace(curve.case, peak=peak.number, mode=peak.mode)
-    if isinstance(answer, FrequencyResponse):
-        model = solution.models[curve.stiffness]
-        normal = answer.contact_force[i, :, 0, 0]
-        for k, side in enumerate(SIDES):
-            yield q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
-        state, energy = answer.state[i], float(answer.energy[i].sum())
-        motion = [of[i] for of in measures.damper_motion(answer, model)]
-    elif (period := curve.periods.get(peak.number)) is not None:
-        state, energy = period.share, period.energy
-        motion = list(marched_damper(solution, curve, period))
+    places = {number: k for number, _, k in contact.at} if contact else {}
+    if contact is None or peak.number not in places:
+        lift, _, slip = answer.share[peak.sample]
+        loss = answer.energy[peak.sample, 2]
     else:
-        for of, value in zip(q.SHARES, np.roll(answer.share[i], -1), strict=True):
-            yield of.of(value, at)
-        yield q.FRICTION_ENERGY.of(answer.energy[i, 2], at)
-        return
-    yield from _shares(at, state, solution.places(curve.stiffness))
-    yield q.CONTACT_SLIP.of(state[:, 1].mean(), at)
-    yield q.CONTACT_LIFT.of(state[:, 2].mean(), at)
-    yield q.FRICTION_ENERGY.of(energy, at)
-    if scene.wants("contact_state"):
-        # Their mean traction remembers where the sliders began.
-        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
-    if scene.wants("hysteresis"):
-        yield q.FRICTION_POWER.of(energy * curve.frequency[i], at)
-    if scene.wants("damper_motion"):
-        yield from motion_results(at, *motion)
+        k = places[peak.number]
+        slip, lift = contact.state[k, :, 1:].mean(axis=0)
+        loss = contact.energy[k].sum()
+        if contact.motion is not None and wants("damper_motion"):
+            yield from motion_results(at, *(of[k] for of in contact.motion))
+    yield q.CONTACT_SLIP.of(slip, at)
+    yield q.CONTACT_LIFT.of(lift, at)
+    yield q.FRICTION_ENERGY.of(loss, at)
 
 
 def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
@@ -286,15 +322,6 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve[Any], blade: Side) -
     return [quantity.of(1.0 - highest / top, case)]
 
 
-def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
-    """Shares of the cycle of each face, from those (n_point, 3) of its points."""
-    for side, share in zip(
-        SIDES, measures.face_shares(state, places.face, places.weight), strict=True
-    ):
-        for quantity, value in zip(q.SHARES, share, strict=True):
-            yield quantity.of(value, replace(at, side=side))
-
-
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------
 
 
@@ -306,7 +333,8 @@ def _with_measured_peaks(solution: ForcedSolution, results: Sequence[Result]) ->
         if not one.withheld and quantity_of(one.name)[0] == q.PEAK_FREQUENCY:
             curves.setdefault(replace(one.case, mode=""), []).append(k)
     for case, mine in curves.items():
-        for found in look_up(MEASURED_PEAK, case.given()):
+        # under this name they are printed: which of a run's peaks each is stands nowhere
+        for found in look_up(q.FREE_PEAK_FREQUENCY.name, case.given()):
             k = min(mine, key=lambda k: abs(out[k].value - found.value))
             out[k] = replace(out[k], reference=found.value, source=found.source, exact=False)
     return out
@@ -348,3 +376,171 @@ def printed_of(plan: ForcedPlan) -> Lookup:
         return look_up(name, case) if free or same else ()
 
     return under_load
+
+
+# -- arrays ----------------------------------------------------------------------------------------
+
+
+def arrays(solution: ForcedSolution) -> dict[str, Group]:
+    """Arrays for result.nc.
+
+    Returns
+    -------
+    dict
+        Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
+        every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
+        latter what the contact does at its peaks), "performance", every "nonlinear mode", and every
+        "measured curve".
+    """
+    out: dict[str, Group] = {}
+    scene = solution.plan.scene
+
+    def add(content: str, case: Case | str, variables: Variables) -> None:
+        """A group of a case, or of a stiffness."""
+        mine = case if isinstance(case, Case) else Case(stiffness=case)
+        out[f"{content} {case}"] = Group(variables, content=content, case=mine)
+
+    for name in (*solution.models, *(solution.faces if scene.wants("contact_state") else ())):
+        add(POINTS, name, _points(solution, name))
+    for name, linear in solution.linear.items():
+        add(LINEAR, name, _linear_arrays(solution, linear))
+    for curve in (c for c in solution.curves if not c.empty):
+        contact, peaks = contact_of(solution, curve), _curve_arrays(curve)
+        behind = {} if contact is None else _contact_arrays(solution, curve, contact)
+        if not curve.way:
+            add(FRICTION, curve.case, peaks | behind)
+            continue
+        add(SWEEP, curve.case, peaks)
+        if contact is not None:
+            behind["frequency"] = variable("frequency", contact.frequency, "Hz")
+            add(MARCHED, curve.case, behind)
+    for name, found in solution.performances.items():
+        add(PERFORMANCE, name, performance.performance_arrays(found))
+    for mode in solution.nonlinear_modes:
+        add(MODES, mode.case, performance.mode_arrays(mode))
+    return out | (measured.measured_arrays(scene.measured) if out else {})
+
+
+def _points(solution: ForcedSolution, name: str) -> Variables:
+    """Where contact points or nodes of whole faces lie, in space and in the frames of their faces;
+    their stiffness, or areas.
+    """
+    at, low = "contact_point", "place up the slope, from the lowest point of the face"
+    places, model = solution.places(name), solution.models.get(name)
+    position = solution.faces[name].of.position if model is None else model.position
+    out: Variables = {
+        "position": variable(f"{at} component", position, "mm"),
+        "face": variable(at, places.face, flag_meanings="left right"),
+        "along": variable(at, places.along, "mm", "place along the damper"),
+        "up": variable(at, places.up, "mm", low),
+    }
+    if model is None:
+        return out | {"area": variable(at, places.weight, "mm2")}
+    law = model.contacts.law
+    return out | {"k_n": variable(at, law.k_n, "N/mm"), "k_t": variable(at, law.k_t, "N/mm")}
+
+
+def _curve_arrays(curve: ForcedCurve[Any]) -> Variables:
+    """A curve: accelerance of both blades in every harmonic that is excited, its peaks, and what
+    its method alone knows.
+    """
+    a, on = curve.answer, "frequency"
+    out: Variables = {
+        "frequency": variable(on, curve.frequency, "Hz", status=a.status, message=a.message),
+        "excitation_force": variable("", curve.force, "N"),
+    }
+    for side in SIDES:
+        out[f"accelerance_{side}"] = accelerance_array(curve.accelerance[side])
+        for k, H in curve.more.items():
+            out[f"accelerance_{side}_harmonic_{k}"] = accelerance_array(H[side])
+        if peaks := curve.peaks[side]:
+            at, height = f"peak_{side}", [one.height for one in peaks]
+            out[f"peak_frequency_{side}"] = variable(at, [one.frequency for one in peaks], "Hz")
+            out[f"peak_accelerance_{side}"] = variable(at, height, "(m/s2)/N")
+    if isinstance(a, FrequencyResponse):
+        words = "0 between two folds, where the frequency falls"
+        return out | {"stable": variable(on, curve.rising.astype(np.int8), "1", words)}
+    if isinstance(a, InterfaceResponse):
+        jumped = np.zeros(len(curve.frequency), np.int8)
+        jumped[list(a.jumps)] = 1
+        words = "whether the motion jumps to another after this point"
+        return out | {"jump": variable(on, jumped, "1", words)}
+    states = "stick slip lift, mean over all points of both faces"
+    kinds = "work of the excitation, lost by damping, by friction"
+    return out | {
+        "share": variable(f"{on} state", a.share[:, [1, 2, 0]], "1", state=states),
+        "energy": variable(f"{on} kind", a.energy, "N mm", kind=kinds),
+        "settled": variable(on, a.settled.astype(np.int8), "1"),
+    }
+
+
+def _contact_arrays(
+    solution: ForcedSolution, curve: ForcedCurve[Any], contact: Contact
+) -> Variables:
+    """What the contact does at points of a curve, as far as it is wanted."""
+    scene, places = solution.plan.scene, solution.places(curve.stiffness)
+    on, energy = "frequency contact_point", contact.energy
+    states, modes = "stick slip lift, shares of the cycle", [mode for _, mode, _ in contact.at]
+    out: Variables = {
+        "excitation_force": variable("", curve.force, "N"),
+        "state": variable(f"{on} state", contact.state, "1", state=states),
+        "energy": variable(on, energy, "N mm", "friction loss per cycle"),
+        "power": variable(on, 1e-3 * energy * contact.frequency[:, None], "W"),
+        "peak": variable(
+            "peak",
+            [number for number, *_ in contact.at],
+            long_name="number of the peak's mode; 0 is the highest point of a curve without",
+            # which mode each is, in the same order
+            modes=", ".join(modes),
+        ),
+        "peak_index": variable(
+            "peak", [i for *_, i in contact.at], "", "place of the peak in frequency, from 0"
+        ),
+    }
+    if scene.wants("contact_state"):
+        share = measures.face_shares(contact.state, places.face, places.weight)
+        words = "stick slip lift, mean over the face by stiffness, or area without springs"
+        out["share"] = variable(
+            "frequency side state", share, "1", side=" ".join(SIDES), state=words
+        )
+    if contact.motion is not None and scene.wants("damper_motion"):
+        k = excitation_of(scene.excitation).lowest
+        words = f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
+        out["damper_amplitude"] = variable(
+            "frequency damper_dof", contact.motion[1], "mm, rad", words
+        )
+    loops = list(contact.loops) if scene.wants("hysteresis") else []
+    return out | (_loop_arrays(loops, places) if loops else {})
+
+
+def _loop_arrays(found: Sequence[tuple[int, Loop]], places: ContactPlaces) -> Variables:
+    """Hysteresis loops at peaks, each with the number of its peak, and what tells them apart: the
+    point's face and place, the loss.
+    """
+    loops = [one for _, one in found]
+    point = np.array([one.point for one in loops])
+    return {
+        "loop_point": variable("loop", point, "", "contact point of each loop"),
+        "loop_displacement": variable("loop sample", [one.displacement for one in loops], "mm"),
+        "loop_traction": variable("loop sample", [one.traction for one in loops], "N"),
+        "loop_limit": variable("loop sample", [one.limit for one in loops], "N"),
+        "loop_peak": variable("loop", [number for number, _ in found], "", "number of the peak"),
+        "loop_side": variable("loop", places.face[point], flag_meanings="left right"),
+        "loop_along": variable("loop", places.along[point], "mm", "place along the damper"),
+        "loop_up": variable("loop", places.up[point], "mm", "place up the slope"),
+        "loop_energy": variable("loop", [one.energy for one in loops], "N mm", "loss per cycle"),
+    }
+
+
+def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
+    """Accelerance of both blades free and stuck, the damping."""
+    choice = solution.plan.scene.excitation
+    excited = excitation_of(choice).words
+    out: Variables = {
+        "frequency": variable("frequency", linear.frequency, "Hz", excitation=excited),
+        "damping": variable("", choice.damping, "1", "modal damping ratio"),
+    }
+    for kind, curves in (("free", linear.free), ("stuck", linear.stuck)):
+        for side in SIDES:
+            out[f"accelerance_{kind}_{side}"] = accelerance_array(curves[side])
+    return out

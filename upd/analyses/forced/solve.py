@@ -136,15 +136,11 @@ def marched_loops(
     count
         Loops at most.
     """
-    out, friction = [], sweep.answer.model.friction
-    compliance = solution.places(sweep.stiffness).compliance
-    for p in measures.losing_most(period.loss, count):
-        traction = period.force[:, 1:, p].T
-        motion = period.slip[:, :, p].T + compliance[p] * traction
-        motion -= motion.mean(axis=1, keepdims=True)
-        limit = friction[p] * period.force[:, 0, p]
-        out.append(measures.loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
-    return out
+    force, friction = period.force.transpose(2, 1, 0), sweep.answer.model.friction
+    compliance = solution.places(sweep.stiffness).compliance[:, None, None]
+    motion = period.slip.transpose(2, 1, 0) + compliance * force[:, 1:]
+    motion -= motion.mean(axis=2, keepdims=True)
+    return measures.largest_loops(period.loss, motion, force, friction, count)
 
 
 def marched_damper(
@@ -165,7 +161,7 @@ def marched_damper(
         damper = solution.models[sweep.stiffness].damper
         rest, kept = np.zeros(damper.n_dof), list(damper.kept)
     N, k = len(period.motion), excitation_of(solution.plan.scene.excitation).lowest
-    motion = np.zeros((N, measures.MOTIONS))
+    motion = np.zeros((N, 6))
     motion[:, kept] = period.motion - rest
     turn = np.exp(-2j * np.pi * k * np.arange(1, N + 1) / N)
     return motion.mean(axis=0), np.abs(2.0 / N * turn @ motion)
