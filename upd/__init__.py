@@ -19,7 +19,7 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     report      the run folder read back: page, comparison, notebook, figures
     analyses    contact, modal, seated, forced, bladed disk: each plans, solves, checks and draws
     vary        one scene with one thing changed, solved again: errors, effects, inputs
-    plot        a Chart of arrays drawn by matplotlib or plotly; pictures of modes and surfaces
+    plot        a Chart of arrays drawn by matplotlib or plotly; an AnswerTable of words; pictures
     scene       scene.toml -> frozen dataclasses
     matrices    K and M of other programs
     measured    measured curves: files, comparison, damping

@@ -15,12 +15,13 @@ from upd.analyses import make_plan as make_any_plan
 from upd.analyses.contact.bodies import prepare
 from upd.analyses.contact.plan import NORMAL, make_plan
 from upd.contact.model import ContactModel
-from upd.contact.normal import normal_contact
+from upd.contact.normal import NormalContact, normal_contact
 from upd.contact.products import (
+    KNOWN,
+    KNOWN_STIFFNESS,
     energy_error,
     half_space_start,
     learning,
-    normal_contact_by_products,
     settled,
     unknown,
 )
@@ -62,6 +63,19 @@ def run(way: str, **more: Any) -> RunResult:
     return upd.run("hertz", overrides={**SMALL, **WAYS[way], **more})
 
 
+def by_products(mine: ContactModel, **control: float) -> NormalContact:
+    """Contact of bodies that learn."""
+
+    def forces(answer: NormalContact) -> list[tuple[np.ndarray, float]]:
+        rates = [] if answer.rates is None else [(answer.rates, KNOWN_STIFFNESS)]
+        return [(answer.force, KNOWN), *rates]
+
+    def solve() -> NormalContact:
+        return normal_contact(mine.compliance(NORMAL), mine.gap, **control)
+
+    return settled(mine, (NORMAL,), solve, forces)
+
+
 @pytest.mark.parametrize("way", ["superlu", "amg"])
 @pytest.mark.parametrize("control", [{"load": 50.0}, {"approach": 0.004}])
 def test_forces_gaps_and_approach_are_those_of_the_condensed_bodies(
@@ -69,7 +83,7 @@ def test_forces_gaps_and_approach_are_those_of_the_condensed_bodies(
 ) -> None:
     dense, mine = condensed(), model(way)
     exact = normal_contact(dense.compliance(NORMAL), dense.gap, **control)
-    found = normal_contact_by_products(mine, **control)
+    found = by_products(mine, **control)
     np.testing.assert_array_equal(found.contact, exact.contact)
     largest = exact.force.max()
     np.testing.assert_allclose(found.force, exact.force, rtol=0.0, atol=1e-8 * largest)
@@ -94,7 +108,7 @@ def test_the_bound_holds_where_products_are_rough() -> None:
                 old.body_solver, old.n_dof, old.kept, old.start, accuracy=accuracy
             )
             body.condensed[only] = (new, free)
-        found = normal_contact_by_products(mine, load=50.0)
+        found = by_products(mine, load=50.0)
         apart = found.force - exact.force
         true = float(np.sqrt(apart @ C @ apart / (exact.force @ C @ exact.force)))
         bound = energy_error(mine, (NORMAL,), found.force)
@@ -140,7 +154,7 @@ def test_several_forces_are_learned_at_once(way: str) -> None:
 
 def test_fields_are_sums_of_known_ones() -> None:
     dense, mine = condensed(), model("amg")
-    found = normal_contact_by_products(mine, load=50.0)
+    found = by_products(mine, load=50.0)
     for name in ("upper", "lower"):
         body, exact = getattr(mine, name), getattr(dense, name)
         learned = learning(body, (NORMAL,))
@@ -232,17 +246,6 @@ def test_start_is_definite_on_any_lattice(ratio: float) -> None:
             if not mirror and components == (2,):
                 assert C[0, -1] == pytest.approx((1 - 0.3**2) / (np.pi * 2e5 * apart), rel=1e-2)
             assert np.abs(C - np.diag(np.diagonal(C))).max() > 0.1 * np.diagonal(C).max()
-
-
-def test_a_column_that_leaves_the_start_indefinite_is_left_out() -> None:
-    X, Y = np.meshgrid(0.1 * np.arange(5), 0.1 * np.arange(5), indexing="ij")
-    points = np.column_stack([X.ravel(), Y.ravel()])
-    held: dict[int, tuple[int, ...]] = {0: (0,), 1: (1,)}
-    plain = half_space_start(points, (2,), held, 2e5, 0.3)
-    wrong = half_space_start(points, (2,), held, 2e5, 0.3, {2: (0, -plain[:, 0])})
-    np.testing.assert_array_equal(wrong, plain)
-    right = half_space_start(points, (2,), held, 2e5, 0.3, {2: (0, plain[:, 0] + 1e-4)})
-    np.testing.assert_allclose(right, plain + 1e-4, rtol=1e-12)
 
 
 def test_a_body_that_learns_nothing_more_is_told() -> None:

@@ -97,7 +97,6 @@ def test_a_number_gets_the_part_of_its_companions() -> None:
     assert part.source == "mesh"
     assert part.error == pytest.approx(1.25 * 5.0 / 105.0, rel=1e-6)
     assert part.half_cost_s == pytest.approx(20.0)
-    assert part.companion_s == pytest.approx(6.0)
     assert "1.41, 2, 2.83" in part.basis
 
 

@@ -19,11 +19,11 @@ from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import recipes
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
 from upd.reference.printed import Lookup, printed_values
 from upd.results import Arrays, Case, Check, Estimates, Group, Result
-from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene, load_scene, ready_scenes
 from upd.scene.base import LeftOut

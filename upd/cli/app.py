@@ -434,7 +434,7 @@ def report(runs: list[Path], *, out: Path | None = None) -> None:
 def scenes() -> None:
     """List the ready scenes."""
     from upd.cli.tables import print_table
-    from upd.results.answer_table import AnswerTable
+    from upd.plot.answer_table import AnswerTable
     from upd.scene import load_scene, ready_scenes
 
     loaded = map(load_scene, ready_scenes())

@@ -17,7 +17,7 @@ from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY, is_file
-from upd.results.answer_table import AnswerTable
+from upd.plot.answer_table import AnswerTable
 from upd.scene import load_scene
 from upd.scene.keys import (
     SceneKey,

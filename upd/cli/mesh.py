@@ -17,9 +17,9 @@ from upd.labels import number
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
+from upd.plot.answer_table import AnswerTable
 from upd.progress import Listener, Stages
 from upd.reduction.cyclic import Sector
-from upd.results.answer_table import AnswerTable
 from upd.scene.keys import recipe_keys
 
 #: nodes per hexahedron that a .inp file can hold

@@ -11,9 +11,9 @@ from rich.text import Text
 from upd.analyses.base import Plan, fitting
 from upd.analyses.cost import memory_limit
 from upd.labels import counted
+from upd.plot.answer_table import AnswerTable
 from upd.report.answer import TITLE, AnswerLine, table_lines
 from upd.report.notebook import RunResult
-from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, OK, WARNED
 
 #: mood of a line -> how it looks

@@ -21,8 +21,7 @@ The approach d at a given load F has d F = f' (h + C f), hence |d - d*| <= 2 max
 `upd.linalg.schur`.
 
 What the bodies start from (`half_space_start`) decides how many products are needed, never what
-comes out. Where a measured column leaves it indefinite, the half-space stands without it, and for
-points whose half-space is, its diagonal.
+comes out.
 
 References
 ----------
@@ -37,11 +36,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag, lapack
+from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from upd.contact.model import Body, ContactModel
-from upd.contact.normal import NormalContact, normal_contact
 from upd.errors import ConvergenceError
 from upd.linalg.common import EPS, log
 from upd.reduction.learned import LearnedCompliance
@@ -53,8 +51,6 @@ Answer = TypeVar("Answer")
 #: Largest share of a force that no product has shown, of forces whose own error counts, and of
 #: those that only give a stiffness e' C^-1 e, whose error is of second order.
 KNOWN, KNOWN_STIFFNESS = 1e-10, 1e-6
-#: relative error in energy of a column that only a start is made of
-ROUGH = 1e-4
 
 
 def half_space_start(
@@ -63,15 +59,12 @@ def half_space_start(
     mirror: Mapping[int, Sequence[int]],
     E: float,
     nu: float,
-    measured: Mapping[int, tuple[int, Array]] | None = None,
 ) -> Array:
     """Compliance of a half-space at contact points, as a start for a body's own.
 
     Forces act evenly on squares around the points that do not overlap, and on their mirror images;
-    normal and tangential directions are not coupled. Where one column of the body's own compliance
-    is given, the displacement under any other force is taken to be the same function of the
-    distance: it has the elements' part near the force, which decides how many products are needed,
-    and the rest of the body's as a constant.
+    normal and tangential directions are not coupled. For points whose half-space is not positive
+    definite, its diagonal.
 
     Parameters
     ----------
@@ -84,9 +77,6 @@ def half_space_start(
         odd about it.
     E, nu : float
         MPa and Poisson's ratio.
-    measured : mapping, optional
-        Component -> a point and the displacements (n,) along the component at all points under a
-        unit force there, its mirror images included; see `centre`.
 
     Returns
     -------
@@ -109,35 +99,20 @@ def half_space_start(
         odd[list(held)] = -1.0
         flip = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
         images += [((s[0] * flip[0], s[1] * flip[1]), sign * odd) for s, sign in images]
-    tables: dict[int, Array] = {}
-    for component, (node, column) in (measured or {}).items():
-        dx, dy = np.abs(x - x[node]), np.abs(y - y[node])
-        on_planes = sum(abs(points[node, axis]) < 1e-6 * width for axis in mirror)
-        own = column / 2.0**on_planes
-        known = kernel(component, dx, dy)[0]
-        i, j = (np.rint(v / width).astype(int) for v in (dx, dy))
-        table = np.full((i.max() + 1, j.max() + 1), np.nan)
-        table[i, j] = own - known
-        tables[component] = table
     blocks = {(a, b): np.zeros((n, n)) for a in components for b in components}
-    beside = {a: np.zeros((n, n)) for a in components}
     for flip, sign in images:
         dx, dy = x[:, None] - flip[0] * x, y[:, None] - flip[1] * y
         for a in components:
             along, across = kernel(a, dx, dy)
             blocks[a, a] += sign[a] * along
-            if a in tables:
-                beside[a] += sign[a] * _beside(tables[a], dx, dy, width)
             for b in components:
                 if b != a and 2 not in (a, b):
                     blocks[b, a] += sign[a] * across
     C = np.block([[blocks[a, b] for b in components] for a in components])
     C = 0.5 * (C + C.T)
-    rest = block_diag(*beside.values())
-    for what, start in (("measured", C + 0.5 * (rest + rest.T)), ("half-space", C)):
-        if lapack.dpotrf(start, lower=1)[1] == 0:
-            return np.asarray(start)
-        log.info("start of %d points: the %s one is not positive definite", n, what)
+    if lapack.dpotrf(C, lower=1)[1] == 0:
+        return np.asarray(C)
+    log.info("start of %d points: the half-space is not positive definite", n)
     return np.diag(np.diagonal(C))
 
 
@@ -148,46 +123,6 @@ def _least_distance(x: Array, y: Array) -> float:
     # coordinates that differ by rounding are one line
     apart = np.concatenate([step[step > np.sqrt(EPS) * extents] for step in steps])
     return float(apart.min()) if apart.size else 1.0
-
-
-def _beside(table: Array, dx: Array, dy: Array, width: float) -> Array:
-    """What the measured displacement differs by from the half-space's, at these distances; beyond
-    the largest ones measured, as there.
-    """
-    i, j = (np.rint(np.abs(v) / width).astype(int) for v in (dx, dy))
-    far = float(table[-1, -1])
-    inside = (i < table.shape[0]) & (j < table.shape[1])
-    found = np.full(dx.shape, far)
-    found[inside] = table[i[inside], j[inside]]
-    return np.where(np.isnan(found), far, found)
-
-
-def centre(points: Array, mirror: Mapping[int, Sequence[int]]) -> int | None:
-    """The contact point whose column of the compliance is worth measuring.
-
-    Parameters
-    ----------
-    points : (n, 3) ndarray
-        mm.
-    mirror : mapping
-        As for `half_space_start`.
-
-    Returns
-    -------
-    int or None
-        The point nearest to the middle of the whole patch; None where the points are no square
-        lattice, or that point lies beside a mirror plane and so near its own image.
-    """
-    lines = [np.unique(np.round(points[:, k], 9)) for k in (0, 1)]
-    if min(len(v) for v in lines) < 3 or len(lines[0]) * len(lines[1]) != len(points):
-        return None
-    steps = np.concatenate([np.diff(v) for v in lines])
-    if not np.ptp(steps) < 1e-6 * steps.mean():
-        return None
-    middle = [0.0 if k in mirror else 0.5 * (v[0] + v[-1]) for k, v in enumerate(lines)]
-    node = int(np.argmin(np.hypot(points[:, 0] - middle[0], points[:, 1] - middle[1])))
-    beside = any(abs(points[node, axis]) > 1e-6 * steps.mean() for axis in mirror)
-    return None if beside else node
 
 
 def learning(body: Body, components: Sequence[int]) -> LearnedCompliance | None:
@@ -319,49 +254,3 @@ def settled(
             )
         last = share
         log.info("contact by products: %d products, %.1e unknown", before, share * KNOWN)
-
-
-def normal_contact_by_products(
-    model: ContactModel,
-    *,
-    load: float | None = None,
-    approach: float | None = None,
-    gap: ArrayLike | None = None,
-    start: ArrayLike | None = None,
-) -> NormalContact:
-    """Frictionless contact of two bodies, with products in place of their compliance.
-
-    Parameters
-    ----------
-    model : ContactModel
-        Its bodies may be condensed or learn.
-    load : float, optional
-        On the model, N. Give exactly one of `load` and `approach`.
-    approach : float, optional
-        mm.
-    gap : (n,) array_like, optional
-        Before the load, mm; None takes the model's.
-    start : (n,) array_like of bool, optional
-        A guess of the contact set.
-
-    Returns
-    -------
-    NormalContact
-        As `normal_contact` gives it.
-
-    Raises
-    ------
-    InputError, ConvergenceError
-        As for `normal_contact`, and where a product does not converge.
-    """
-    gaps = model.gap if gap is None else gap
-
-    def solve() -> NormalContact:
-        return normal_contact(model.compliance(2), gaps, load=load, approach=approach, start=start)
-
-    def forces(answer: NormalContact) -> Iterable[tuple[Array, float]]:
-        yield answer.force, KNOWN
-        if answer.rates is not None:
-            yield answer.rates, KNOWN_STIFFNESS
-
-    return settled(model, (2,), solve, forces)

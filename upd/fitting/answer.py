@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.fitting.residuals import SHOWN, FittedCurve, FurtherMeasurement, Knowledge, Start, is_bent
 from upd.fitting.targets import FitTarget, VariedInput, fitted_scene
+from upd.plot.answer_table import AnswerTable, Rounded
 from upd.plot.chart import Axis, Band, Chart, Trace
 from upd.report.answer import FigureAnswer
-from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene import ForcedScene
 
 Array = NDArray[np.float64]

@@ -17,11 +17,11 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Chart, Entry
 from upd.report import tables
 from upd.report.columns import SHORT, whole_table, wrapped
 from upd.report.page import Section, page_text, versions_text
-from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of, worst_check
 from upd.results.quantities import number_label, quantity_of
 from upd.scene import AnyScene

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Sequence
 from itertools import zip_longest
 
-from upd.results.answer_table import AnswerTable
+from upd.plot.answer_table import AnswerTable
 
 #: between two columns
 GAP = 2

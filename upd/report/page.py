@@ -19,10 +19,10 @@ from markupsafe import Markup, escape
 
 from upd.cache.files import placed_file
 from upd.labels import sentence
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
 from upd.report.tables import MOST_NOTES, filled
-from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -13,6 +13,7 @@ from typing import Any
 
 from upd.errors import InputError
 from upd.labels import number, percent, sentence, shown
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Axis, Chart, Entry
 from upd.plot.style import colour_range
 from upd.plot.surface import read_surface
@@ -20,7 +21,6 @@ from upd.report import tables
 from upd.report.answer import checked
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, page_text, write_page
-from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of
 from upd.results.quantities import number_label
 from upd.scene.read import leaves

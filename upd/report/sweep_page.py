@@ -15,11 +15,11 @@ import numpy as np
 
 from upd.labels import counted, listed, number, sentence, unit_label
 from upd.plot import sweep_charts as charts
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Chart
 from upd.report.folder import read_json
 from upd.report.page import Section, Verdict, page_text, versions_text, write_page
 from upd.report.tables import filled, sample_table, stage_table, with_unit
-from upd.results.answer_table import AnswerTable
 from upd.results.number import from_json
 from upd.results.quantities import number_title
 from upd.results.sampled import SampledNumber

@@ -11,9 +11,9 @@ from typing import Any
 from upd import labels
 from upd.analyses import analysis_named
 from upd.analyses.base import Effect
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Chart, Entry
 from upd.results import Arrays, ErrorPart
-from upd.results.answer_table import AnswerTable
 from upd.results.check import worst_check, worst_checks
 from upd.results.number import from_json
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title

@@ -51,8 +51,6 @@ class Case:
         How the blades move at a peak: "in phase", "out of phase".
     choice
         What was chosen differently: "start mid", "3 harmonics".
-    part
-        Share of the first natural frequency.
     frequency
         Hz.
     side
@@ -77,7 +75,6 @@ class Case:
     peak: int | None = _written("at peak {}", None)
     mode: str = _written("{}")
     choice: str = _written("{}")
-    part: float | None = _written("{} f1", None)
     frequency: float | None = _written("{} Hz", None)
     side: str = _written("{}")
     engine_order: int | None = _written("EO {}", None)

@@ -53,8 +53,6 @@ class ErrorPart:
         How it was estimated, or why it was not.
     half_cost_s
         Predicted seconds that half of it adds to the run; None where they are not known.
-    companion_s
-        Seconds of the cheaper run it was estimated with.
     half_why
         Why half of it is out of reach, where it is: "needs 26 GB, there are 12".
     """
@@ -63,7 +61,6 @@ class ErrorPart:
     error: float
     basis: str
     half_cost_s: float | None = None
-    companion_s: float | None = None
     half_why: str = ""
 
     @property

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from upd.plot.answer_table import AnswerTable, Rounded
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.report.answer import FigureAnswer
-from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene.rotation import damper_mass
 from upd.sizing.ranges import FORCE, TURNING, InputRange, Ranges
 from upd.sizing.worst_peak import SLOPE_STEP, LowestWorst, PeaksOver, WorstPeak, reached

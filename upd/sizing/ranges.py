@@ -22,8 +22,8 @@ from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
 from upd.linalg.parallel import threads_for
+from upd.plot.answer_table import Rounded
 from upd.progress import Stages
-from upd.results.answer_table import Rounded
 from upd.scene import ForcedScene
 from upd.scene.forced import FORCED
 from upd.scene.keys import scalar_input, scene_keys

@@ -36,9 +36,9 @@ from upd.contact.rigid_damper import (
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
 from upd.mesh import Mesh, recipes
+from upd.plot.answer_table import AnswerTable, Rounded
 from upd.plot.chart import Axis, Band, Chart, Map, Trace
 from upd.report.answer import FigureAnswer
-from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene import AnyScene
 from upd.scene.base import rig_parameters
 from upd.scene.forced import FORCED

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.labels import percent, unit_label
-from upd.results.answer_table import AnswerTable
+from upd.plot.answer_table import AnswerTable
 from upd.results.quantities import number_label, quantity_of
 from upd.vary.orders import ErrorEstimate, change_order, estimate_error, extrapolate, fit_rate
 from upd.vary.outcome import SolvedPoint, matching, without_failed

@@ -119,7 +119,6 @@ def source_estimates(
     """
     known = [one for one in levels if not one.reason]
     faults = "; ".join(one.reason for one in levels if one.reason)
-    seconds = math.fsum(one.seconds for one in known)
     seconds_of_half = cache(partial(_or_reason, half))
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     for number in run.numbers:
@@ -132,7 +131,7 @@ def source_estimates(
             cost, why = seconds_of_half(
                 found.order if 0.0 < found.order < math.inf else found.falls
             )
-            part = ErrorPart(source, found.error, found.basis, cost, seconds, why)
+            part = ErrorPart(source, found.error, found.basis, cost, why)
         else:
             part = ErrorPart(source, math.nan, found.basis or faults or _LACKING)
         out[key] = (part,)

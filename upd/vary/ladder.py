@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
-from upd.results.answer_table import AnswerTable
+from upd.plot.answer_table import AnswerTable
 from upd.vary.curves import (
     ESTIMATED,
     TRUE,

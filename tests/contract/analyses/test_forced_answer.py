@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from upd.analyses.forced.answer import answer, headline
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Entry
 from upd.results import Case, Result
-from upd.results.answer_table import AnswerTable
 from upd.results.quantities import Quantity
 
 OWN = Case(stiffness="own")

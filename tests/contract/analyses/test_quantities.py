@@ -65,7 +65,7 @@ def test_values_are_given_in_mm_and_come_in_the_unit() -> None:
 
 def test_words() -> None:
     assert number_label("left_peak_2_frequency") == "left blade, peak 2, frequency"
-    assert number_label("K_N_damper_alone") == "K_N, platform rigid"
+    assert number_label("K_N_damper_alone") == "K_N of the damper alone"
     assert number_label("K_Ty_damper_alone") == "K_T along y, platform rigid"
     assert number_label("f3_free") == "f3 free"
     assert number_label("number_of_another_tool") == "number of another tool"

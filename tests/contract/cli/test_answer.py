@@ -18,12 +18,12 @@ import upd
 from tests.pictures import no_figures
 from upd import cli
 from upd.cli.tables import print_result, print_table
+from upd.plot.answer_table import AnswerTable
 from upd.report.answer import LINES
 from upd.report.columns import folded_head, whole_table
 from upd.report.notebook import RunResult
 from upd.report.tables import MOST_NOTES, main_numbers, warnings
 from upd.results import NO_CASE, Case, Check, Result
-from upd.results.answer_table import AnswerTable
 from upd.results.check import outcome_of, status_of
 from upd.results.quantities import Quantity
 from upd.scene import ready_scenes

@@ -12,11 +12,11 @@ from rich.console import Console
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.analyses.contact.analysis import ANALYSES
 from upd.cli.tables import print_result
+from upd.plot.answer_table import AnswerTable
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
 from upd.report.tables import answer_tables, warnings
 from upd.results import NO_CASE, Case, Check, Result
-from upd.results.answer_table import AnswerTable
 from upd.results.check import status_of
 from upd.results.quantities import Quantity, number_label
 

@@ -23,10 +23,10 @@ import pytest
 
 from upd import run
 from upd.analyses.contact.analysis import ANALYSES
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.report import write_report
 from upd.report.page import Section, page_text, write_page
-from upd.results.answer_table import AnswerTable
 
 PHONE, DESK, SCREEN = 390, 1280, 800
 #: pixels of a page that opens on its answer, where all else is folded

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from upd.analyses.forced.results import FRICTION, LINEAR, MARCHED, MODES, PERFORMANCE, POINTS, SWEEP
 from upd.analyses.measured import measured_traces
 from upd.labels import percent_of
+from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Area, Array, Axis, Chart, Entry, Mark, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Arrays, Case, Group, Result
 from upd.results import quantities as q
-from upd.results.answer_table import AnswerTable
 from upd.results.number import read_result
 from upd.results.quantities import Quantity, quantity_of
 from upd.scene.forced_contact import SIDES

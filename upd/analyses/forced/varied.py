@@ -199,11 +199,10 @@ def _parts(levels: Sequence[SolvedVariation], key: Key, own: float) -> Iterator[
             for one in level.numbers
             if one.withheld and (one.name, one.case) == key
         ]
-        seconds = math.fsum(one.seconds for one in mine)
         if found:
-            yield ErrorPart(source, *bound(source, found), None, seconds)
+            yield ErrorPart(source, *bound(source, found))
         elif whys:
-            yield ErrorPart(source, math.nan, f"not estimated: {whys[0]}", None, seconds)
+            yield ErrorPart(source, math.nan, f"not estimated: {whys[0]}")
 
 
 def _at_least(parts: Sequence[ErrorPart], others: Sequence[ErrorPart]) -> list[ErrorPart]:

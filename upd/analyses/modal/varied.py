@@ -12,8 +12,8 @@ from upd.analyses.modal.plan import MODES_ABOVE, ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
 from upd.analyses.modal.solve import ModalSolution, solve
 from upd.errors import InputError
+from upd.plot.answer_table import AnswerTable
 from upd.results import ErrorPart, Estimates, Result
-from upd.results.answer_table import AnswerTable
 from upd.results.quantities import quantity_of
 from upd.scene import RigScene
 from upd.vary.errors import merged

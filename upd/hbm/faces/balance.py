@@ -222,9 +222,6 @@ class InterfacePoint(NamedTuple):
         By friction at each node in a period, of the whole [N mm].
     unresolved : float
         Motion of the faces by blades' harmonics above H over that by those up to H.
-    residual : float
-        The residual of the equations: of the blades' forces over the forces, of slips and the
-        damper's motion after the period over the motion of the faces, whichever is larger.
     """
 
     frequency: float
@@ -237,7 +234,6 @@ class InterfacePoint(NamedTuple):
     nodes: FloatArray
     loss: FloatArray
     unresolved: float
-    residual: float
 
 
 def read_point(e: InterfaceEquations, period: ContactPeriod, frequency: float) -> InterfacePoint:
@@ -268,7 +264,6 @@ def read_point(e: InterfaceEquations, period: ContactPeriod, frequency: float) -
         nodes,
         loss,
         _unresolved(e, period),
-        _residual(e, period),
     )
 
 
@@ -282,20 +277,6 @@ def _unresolved(e: InterfaceEquations, period: ContactPeriod) -> float:
     if moved == 0.0:
         return 0.0
     return float(np.linalg.norm(model.shapes @ (modal / resistance).T)) / moved
-
-
-def _residual(e: InterfaceEquations, period: ContactPeriod) -> float:
-    """The largest of the residual of the equations, over what they are made of."""
-    model, q = e.model, period.q
-    forces = np.abs(e.Q @ period.modal).max() + np.abs(e.drive @ model.places.T).max()
-    blades = float(np.abs(e.misfit(period)).max() / forces) if forces > 0.0 else 0.0
-    face = float(np.abs(model.shapes @ q[1:].T).max())
-    if face <= EPS * float(np.abs(model.shapes @ q[0]).max()):
-        return blades
-    reach = np.abs(model.columns).max(axis=0)
-    moved = np.abs((period.rigid - period.rigid_before)[0] * reach).max()
-    slid = np.abs(period.slip - period.slip_before).max()
-    return max(blades, float(max(moved, slid)) / face)
 
 
 def _rubbed(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
