@@ -192,7 +192,7 @@ def explicit_march(model: Model, damping: float) -> ExplicitMarch:
         Of all modes of the blades, ratio to critical.
     """
     assert model.contacts.tangents == 1
-    assert model.excitation.usual
+    assert model.excitation.blades == ("right",)
     values, shapes = eigh(model.K, model.M)
     mass, turn = eigh(model.damper.M)
     damper = turn / np.sqrt(mass)

@@ -41,7 +41,7 @@ benchmarks/.
 
 from typing import TYPE_CHECKING
 
-from upd.lazy_names import lazy_names
+from upd.lazy_names import load_on_use
 
 __version__ = "0.2.0"
 
@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from upd.scene import load_scene as load_scene
     from upd.sizing import design as design
 else:
-    __getattr__, __dir__, __all__ = lazy_names(
+    __getattr__, __dir__, __all__ = load_on_use(
         __name__,
         {
             "": "contact dynamics hbm linalg matrices measured own_matrices reduction reference",

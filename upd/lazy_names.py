@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 
-def lazy_names(package: str, homes: dict[str, str]) -> tuple[object, object, list[str]]:
+def load_on_use(package: str, homes: dict[str, str]) -> tuple[object, object, list[str]]:
     """``__getattr__``, ``__dir__`` and ``__all__`` of a package that loads its names when they are
     used: what needs few of its modules loads few.
 

@@ -27,7 +27,11 @@ F_C = 350.0
 
 @cache
 def rig(scene: str, element: str = "hex8i") -> tuple[ForcedPlan, Bodies]:
-    plan: Any = make_plan(load_scene(f"{scene}-response", [*SET_LINES, f"mesh.element={element}"]))
+    plan: Any = make_plan(
+        load_scene(
+            f"{scene}-response", [*SET_LINES, f"mesh.element={element}", "mesh.symmetry=full"]
+        )
+    )
     return plan, make_bodies(plan)
 
 

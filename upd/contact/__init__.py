@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from upd.lazy_names import lazy_names
+from upd.lazy_names import load_on_use
 
 if TYPE_CHECKING:
     from upd.contact.coupled import CoupledContact as CoupledContact
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from upd.contact.tilt import TiltedContact as TiltedContact
     from upd.contact.tilt import tilted_contact as tilted_contact
 else:
-    __getattr__, __dir__, __all__ = lazy_names(
+    __getattr__, __dir__, __all__ = load_on_use(
         __name__,
         {
             "coupled": "CoupledContact coupled_contact",

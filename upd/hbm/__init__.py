@@ -17,7 +17,7 @@ True
 
 from typing import TYPE_CHECKING
 
-from upd.lazy_names import lazy_names
+from upd.lazy_names import load_on_use
 
 if TYPE_CHECKING:
     from upd.hbm.core.continuation import Path as Path
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from upd.hbm.springs.waves import travelling_wave_response as travelling_wave_response
     from upd.hbm.springs.waves import wave_in_time as wave_in_time
 else:
-    __getattr__, __dir__, __all__ = lazy_names(
+    __getattr__, __dir__, __all__ = load_on_use(
         __name__,
         {
             "core.continuation": "Path State follow",

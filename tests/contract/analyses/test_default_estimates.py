@@ -199,4 +199,4 @@ def test_an_answer_says_when_finer_levels_do_not_help(
 
 def test_the_coarsest_mesh_says_which_divisions_give_an_estimate() -> None:
     plan = make_plan(as_scene("symmetric", {"geometry.divisions": 1}))
-    assert "geometry.divisions to 6 or more" in levels(plan)["mesh"]
+    assert "geometry.divisions, 6 or more" in levels(plan)["mesh"]

@@ -43,9 +43,9 @@ def test_every_source_counts(copy: Path) -> None:
 def test_a_new_or_renamed_source_counts(copy: Path) -> None:
     before = sources.digest_of(sources.our_sources(copy), copy)
     other = copy / "upd" / "fem" / "another.py"
-    (copy / "upd" / "fem" / "material.py").rename(other)
+    (copy / "upd" / "fem" / "inertia.py").rename(other)
     assert sources.digest_of(sources.our_sources(copy), copy) != before
-    other.rename(copy / "upd" / "fem" / "material.py")
+    other.rename(copy / "upd" / "fem" / "inertia.py")
 
 
 def test_recipe_and_libraries_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -317,23 +317,23 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 10612,
-    "hbm": 6247,
-    "contact": 3459,
+    "analyses": 10611,
+    "hbm": 6234,
+    "contact": 3407,
     "linalg": 2713,
     "scene": 2197,
-    "plot": 1483,
+    "plot": 1510,
     "report": 1365,
     "fitting": 1385,
     "sizing": 1321,
     "batch": 1459,
     "mesh": 1408,
-    "vary": 1240,
+    "vary": 1239,
     "reference": 901,
     "cli": 805,
     "measured": 880,
     "reduction": 1099,
-    "results": 695,
+    "results": 664,
     "fem": 723,
     "matrices": 616,
     "root": 523,
@@ -343,7 +343,7 @@ ROOM_LINES = {
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 42333, 278, 3233, 391
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 42262, 278, 3227, 391
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -95,7 +95,7 @@ def test_curves_hold_every_digit_and_their_units(run: RunResult) -> None:
         # the computed fields, with their places, beside the closed forms
         label = run.results[0].case.label
         file, group = file_name(label), run.arrays[label]
-        places = _read(run.folder / "curves" / f"{file}-map.csv")
+        places = _read(run.folder / "curves" / f"{file}.csv")
         np.testing.assert_array_equal(places["pressure [MPa]"], group["pressure"].data.ravel())
         top = np.argmax(places["pressure [MPa]"])
         i, j = np.unravel_index(top, group["pressure"].data.shape)
