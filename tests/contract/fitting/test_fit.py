@@ -106,17 +106,17 @@ def test_a_dimension_is_fitted_by_differences(scene: ForcedScene) -> None:
 
 
 def test_more_parameters_than_targets_are_told_as_a_family(scene: ForcedScene) -> None:
-    vary = [RIGHT, LEFT]
-    (made,) = numbers(scene, "stuck_in_phase", vary, [0.6, 0.1])
-    target = f"stuck_in_phase={made:.12g} Hz"
-    found = upd.fit(scene, target, vary, starts=3)
+    vary, factors = [NORMAL, RIGHT, LEFT], [0.5, 0.6, 0.1]
+    made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", vary, factors)
+    found = upd.fit(scene, MODES.format(*made, w=""), vary, starts=3)
     assert found.status == "family"
-    assert "a family of inputs, with 1 unknown direction, meets the target" in found.verdict
+    assert "a family of inputs, with 1 unknown direction, meets both targets" in found.verdict
     assert found.known.correlation is None
     (row,) = found.known.directions[found.known.unknown]
-    residuals = Residuals(FitResponses(scene, read_targets(target), read_parameters(scene, vary)))
+    targets = read_targets(MODES.format(*made, w=""))
+    residuals = Residuals(FitResponses(scene, targets, read_parameters(scene, vary)))
     # along the direction nothing moves to first order, across it something does
-    along, across = (residuals.jacobian(found.answers[0]) @ v for v in (row, [1.0, 1.0]))
+    along, across = (residuals.jacobian(found.answers[0]) @ v for v in (row, [1.0, 1.0, 1.0]))
     # another count of threads moves a frequency by 2e-11, and a difference over two steps by 7e-9
     assert np.abs(along).max() < ROUNDING < 1e-4 < np.abs(across).max()
     # every member meets the targets, and the family is long
