@@ -230,7 +230,7 @@ def _modes(known: Known) -> AnswerTable:
 
 
 def _inputs(known: Known) -> AnswerTable:
-    """The inputs that change the peaks most."""
+    """The inputs that change the peaks most, beside the numerical error."""
     changes: dict[str, list[Result]] = {}
     for one in known.values():
         if _is(one, *_WEIGHTS):
@@ -250,12 +250,25 @@ def _inputs(known: Known) -> AnswerTable:
         )
         for name, mine in ranked[:_INPUTS]
     ]
+    bounds = _largest_bound(known, q.PEAK_FREQUENCY), _largest_bound(known, q.PEAK_ACCELERANCE)
+    if rows and any(bounds):
+        rows.append(("numerical error", "largest bound", *bounds))
     ratios = (one.case.force_ratio or 0.0 for mine in changes.values() for one in mine)
     note = f"Changes of the right blade's peaks at F_C/F_E {min(ratios, default=0.0):g}."
     if others := ", ".join(name for name, _ in ranked[_INPUTS:]):
         note += f" Less than these: {others}."
     heads = ("input", "changed to", "#frequency", "#height")
     return AnswerTable("What the answer depends on most", heads, tuple(rows), note)
+
+
+def _largest_bound(known: Known, quantity: Quantity) -> str:
+    """Of a number of all peaks with friction."""
+    errors = [
+        one.estimated_error
+        for one in known.values()
+        if _is(one, quantity) and one.case.force_ratio and one.estimated_error is not None
+    ]
+    return f"±{percent_of(max(errors))}" if errors else ""
 
 
 def _span(changes: Sequence[Result], quantity: Quantity, digits: int) -> str:
