@@ -30,10 +30,10 @@ from upd.analyses.forced.interface_model import (
     make_springs,
     worn_start,
 )
-from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import preloaded, respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.analyses.forced.statics import static_state
+from upd.analyses.measured import CurvePeak
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse

@@ -15,8 +15,8 @@ from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks
 from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top
 from upd.analyses.forced.interface_model import make_springs
-from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.solve import ForcedSolution
+from upd.analyses.measured import CurvePeak
 from upd.errors import ConvergenceError
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.springs.time_integration import steady_state

@@ -15,10 +15,10 @@ from upd.analyses import forced, make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import SweptCurve
 from upd.analyses.forced.interface_model import by_coulomb, make_springs
-from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import respond
 from upd.analyses.forced.results import arrays, make_results
 from upd.analyses.forced.solve import ForcedSolution, marched_damper, marched_loops
+from upd.analyses.measured import CurvePeak
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.hbm.faces.sweep import RecordedPeriod, period_of_sweep, recorded_period

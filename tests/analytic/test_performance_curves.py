@@ -15,7 +15,6 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import performance
-from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.performance import (
     Performance,
     RatioPoint,
@@ -25,6 +24,7 @@ from upd.analyses.forced.performance import (
     ratios_of,
 )
 from upd.analyses.forced.solve import ForcedSolution
+from upd.analyses.measured import CurvePeak
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,28 +46,32 @@ _NOT_WHITE = (
 )
 
 
-class ComputedPeak(NamedTuple):
-    """A peak of a computed curve.
+class CurvePeak(NamedTuple):
+    """A peak of a curve: frequency in Hz, height, and the point of the path next to it.
 
-    Its number from the lowest, Hz, (m/s2)/N, how the blades move: "" where it is not known.
+    Number, words and MAC of its mode; "" and nan of a curve that moves in no stuck mode (free). The
+    blade, where peaks of both stand together.
     """
 
-    number: int
     frequency: float
     height: float
+    sample: int
+    number: int = 0
     mode: str = ""
+    mac: float = float("nan")
+    blade: Literal["left", "right", ""] = ""
 
 
 @dataclass(frozen=True)
 class Computed:
     """A computed curve: its case, band in Hz, accelerance at frequencies (nan where it has not one
-    value), peaks with the attributes of `ComputedPeak`.
+    value), its peaks.
     """
 
     case: Case
     band: tuple[float, float]
     at: Callable[[Array], ComplexArray]
-    peaks: Sequence[Any]
+    peaks: Sequence[CurvePeak]
 
 
 def measured_results(

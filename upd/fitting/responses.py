@@ -24,11 +24,12 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import Limit, Top, fine_grid, point_limit, stuck_frequency
-from upd.analyses.forced.measures import CANDIDATES, CurvePeak, numbered_peaks
+from upd.analyses.forced.measures import CANDIDATES, numbered_peaks
 from upd.analyses.forced.model import Model, make_model, quiet, respond
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import face_laws
+from upd.analyses.measured import CurvePeak
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import Journal, cache_folder
 from upd.cache.files import write_text

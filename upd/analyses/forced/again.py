@@ -21,7 +21,7 @@ import numpy as np
 from upd.analyses.cost import NODES
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves, PointCurve, Top, linear_of, stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.measures import numbered_peaks
 from upd.analyses.forced.model import (
     BAND,
     BAND_POINTS,
@@ -35,6 +35,7 @@ from upd.analyses.forced.model import (
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, parameters_of
 from upd.analyses.forced.statics import face_laws
+from upd.analyses.measured import CurvePeak
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm.core.fourier import harmonics, sample_count

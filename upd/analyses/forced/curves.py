@@ -27,9 +27,10 @@ from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import WholeFaces, by_coulomb
-from upd.analyses.forced.measures import Array, ComplexArray, CurvePeak, ModeShapes, StuckMode
+from upd.analyses.forced.measures import Array, ComplexArray, ModeShapes, StuckMode
 from upd.analyses.forced.model import Model, balance_of
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid, time_steps
+from upd.analyses.measured import CurvePeak
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.state import InterfaceModel, InterfaceState

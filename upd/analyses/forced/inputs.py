@@ -22,9 +22,10 @@ from scipy.linalg import block_diag
 from upd.analyses.base import Resolved
 from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
 from upd.analyses.forced.curves import Top, stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, StuckMode, mode_shapes
+from upd.analyses.forced.measures import StuckMode, mode_shapes
 from upd.analyses.forced.model import Array, Model, balance_of, preloaded
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
+from upd.analyses.measured import CurvePeak
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import damper_compliance
 from upd.errors import InputError, UpdError, one_line

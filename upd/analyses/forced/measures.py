@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced.model import Model
+from upd.analyses.measured import CurvePeak
 from upd.dynamics.peaks import find_peaks
 from upd.hbm import FrequencyResponse
 from upd.hbm.core.fourier import to_complex
@@ -118,22 +118,6 @@ def accelerance_of(
 ) -> ComplexArray:
     """(n,) (m/s2)/N of F_E, from the amplitudes (n,) mm of a harmonic at frequencies (n,) in Hz."""
     return np.asarray(-((2.0 * np.pi * harmonic * frequency) ** 2) * _M / force * moved)
-
-
-class CurvePeak(NamedTuple):
-    """A peak of a curve: frequency in Hz, height, and the point of the path next to it.
-
-    Number, words and MAC of its mode; "" and nan of a curve that moves in no stuck mode (free). The
-    blade, where peaks of both stand together.
-    """
-
-    frequency: float
-    height: float
-    sample: int
-    number: int = 0
-    mode: str = ""
-    mac: float = float("nan")
-    blade: Side | Literal[""] = ""
 
 
 def path_maxima(

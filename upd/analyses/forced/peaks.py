@@ -33,9 +33,10 @@ from upd.analyses.forced.curves import (
     rising,
 )
 from upd.analyses.forced.interface_model import SpringMarch, by_coulomb, make_springs, state_at
-from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.measures import numbered_peaks
 from upd.analyses.forced.model import Array, Model, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
+from upd.analyses.measured import CurvePeak
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.faces.march import InterfaceMarch

@@ -22,9 +22,10 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves, PointCurve, fine_grid, stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.measures import numbered_peaks
 from upd.analyses.forced.model import LONG_STEPS, SWEEP_POINTS, Array, Model, balance_of
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.measured import CurvePeak
 from upd.errors import InputError
 from upd.hbm import nonlinear_mode
 from upd.hbm.springs.balance import Balance

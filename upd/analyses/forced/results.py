@@ -15,11 +15,11 @@ from upd.analyses import base, measured
 from upd.analyses.forced import measures, performance
 from upd.analyses.forced.again import limit_results, peak_results
 from upd.analyses.forced.curves import ForcedCurve, Limit, LinearCurves, faces_limit, point_limit
-from upd.analyses.forced.measures import CurvePeak, Loop
+from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper, marched_loops
-from upd.analyses.measured import FREE, STUCK, Computed, accelerance_array
+from upd.analyses.measured import FREE, STUCK, Computed, CurvePeak, accelerance_array
 from upd.analyses.seated.bodies import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse

@@ -23,12 +23,13 @@ from upd.analyses.forced.interface_model import (
     make_springs,
     make_whole_faces,
 )
-from upd.analyses.forced.measures import CurvePeak, Loop
+from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array, Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.performance import ModeCurve, Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.statics import admissible, face_laws
+from upd.analyses.measured import CurvePeak
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from upd.analyses.base import printed_of, with_printed
-from upd.analyses.measured import FREE, Computed, ComputedPeak, fit_checks, measured_results
+from upd.analyses.measured import FREE, Computed, CurvePeak, fit_checks, measured_results
 from upd.analyses.modal.solve import (
     ModalSolution,
     ModeSet,
@@ -107,7 +107,7 @@ def _beside_measured(solution: ModalSolution, response: RigResponse) -> list[Res
             return []
         found = find_peaks(f, np.abs(H))
         peaks = [
-            ComputedPeak(k, float(at), float(height))
+            CurvePeak(float(at), float(height), int(np.abs(f - at).argmin()), k)
             for k, (at, height) in enumerate(zip(found.frequency, found.height, strict=True), 1)
         ]
         case = Case(kind=choice.state or "", blade=choice.blade)
