@@ -29,6 +29,7 @@ from upd.analyses.forced.again import (
 )
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.peaks import climbed
+from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.forced.varied import bound, estimate
 from upd.errors import ConvergenceError
@@ -37,6 +38,7 @@ from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
+from upd.vary.solve import changed
 from upd.vary.variation import Variation
 
 pytestmark = pytest.mark.estimated
@@ -210,6 +212,26 @@ def test_few_harmonics_tell_what_they_miss(slipping: Found) -> None:
     true = abs(top_of(fine).height / top_of(slipping).height - 1.0)
     assert true > 1e-4
     assert bounded(parts_of(slipping, "peak_2_accelerance")[HARMONICS], true, 10.0)
+
+
+def test_harmonics_are_told_where_the_best_damper_is() -> None:
+    """The run's own curve sticks; at the best F_C/F_E one harmonic misses a lot."""
+    choice = {
+        "want": ["response", "performance"],
+        "performance__lowest": 40.0,
+        "performance__highest": 400.0,
+        "performance__points": 3,
+    }
+    found = solved(STICKS, balance__harmonics=1, **choice)
+    part = parts_of(found, "best_peak")[HARMONICS]
+    best = number(found, "best_ratio").value
+    solution, overrides = found[0], (("balance.harmonics", 9), ("balance.samples", 128))
+    finer = replace(solution.plan, scene=changed(solution.plan.scene, overrides))
+    truth = peaks_at(finer, solution.models["thesis"], best).worst.height
+    true = abs(truth / number(found, "best_peak").value - 1.0)
+    assert 0.01 < true < part.error
+    assert f"at F_C/F_E {best:.3g}" in part.basis
+    assert HARMONICS not in parts_of(found, "peak_2_accelerance"), "nothing slips there"
 
 
 def test_few_samples_tell_what_they_miss(slipping: Found) -> None:

@@ -317,7 +317,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 10622,
+    "analyses": 10642,
     "hbm": 6231,
     "contact": 3403,
     "linalg": 2713,
@@ -343,7 +343,7 @@ ROOM_LINES = {
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 42266, 277, 3228, 390
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 42111, 277, 3229, 390
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

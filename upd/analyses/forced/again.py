@@ -332,9 +332,8 @@ def level_variations(plan: ForcedPlan) -> list[Variation]:
     """Half of the modes, more contact points; more harmonics, more samples; coarser meshes."""
     scene = plan.scene
     modes, highest = scene.reduction.modes, int(scene.balance.harmonics)
-    few, more = modes // 2, highest + MORE_HARMONICS
-    half = (("reduction.modes", few),)
-    finer = (("balance.harmonics", more), ("balance.samples", samples(scene, 1, more)))
+    few = modes // 2
+    half, (more, finer) = (("reduction.modes", few),), more_harmonics(scene)
     twice = (("balance.samples", samples(scene, 2)),)
     return [
         *([Variation(MODES, f"{few} modes a blade", half, size=modes / few)] if few else []),
@@ -343,6 +342,12 @@ def level_variations(plan: ForcedPlan) -> list[Variation]:
         Variation(SAMPLES, "2 times the samples", twice, size=0.5),
         *(_coarser(plan, factor) for factor in COARSER),
     ]
+
+
+def more_harmonics(scene: ForcedScene) -> tuple[int, Overrides]:
+    """The highest of some harmonics more, and what makes them: with samples for them."""
+    more = int(scene.balance.harmonics) + MORE_HARMONICS
+    return more, (("balance.harmonics", more), ("balance.samples", samples(scene, 1, more)))
 
 
 def samples(scene: ForcedScene, factor: int, highest: int = 1) -> int:

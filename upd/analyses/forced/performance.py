@@ -63,11 +63,15 @@ class Performance:
         The curves, F_C/F_E rising.
     free, stuck
         Highest peaks of both limits, (m/s2)/N.
+    finer
+        A point near the best one, and the same with more harmonics; None where these are not
+        solved.
     """
 
     points: tuple[RatioPoint, ...]
     free: float
     stuck: float
+    finer: tuple[RatioPoint, RatioPoint] | None = None
 
     @property
     def known(self) -> list[RatioPoint]:

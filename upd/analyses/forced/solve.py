@@ -342,7 +342,7 @@ def _around(
     """What is solved again around the peaks: once, on the reduced models."""
     plan, bodies, first = solution.plan, solution.bodies, next(iter(solution.models))
     assert bodies is not None
-    scene, work = plan.scene, list[_Work]()
+    scene, work, finer = plan.scene, list[_Work](), list[RatioPoint]()
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
         given = with_totals(plan, name, model), name, model, solution.linear[name]
@@ -355,17 +355,25 @@ def _around(
         if name == first:
             if scene.wants("performance"):
                 curve = partial(performance.performance_of, solution.linear[name], points, mine)
+                near = curve().best
                 work += [
                     _Work(points.append, performance.peaks_at, (plan, model, ratio))
                     for ratio in curve().beside_best()
                 ]
+                if near is not None and variants[name]:
+                    more = replace(plan, scene=changed(scene, again.more_harmonics(scene)[1]))
+                    point = more, model, near.ratio
+                    work.append(_Work(finer.append, performance.peaks_at, point))
             if scene.wants("inputs") or scene.left_out.solves:
                 work += _at_few_harmonics(solution, run, bodies)
             if scene.wants("band"):
                 work += _band(solution, name)
     _done(beside, work)
     if scene.wants("performance"):
-        solution.performances[first] = curve()
+        found = curve()
+        if near is not None and finer and finer[0].peaks:
+            found = replace(found, finer=(near, finer[0]))
+        solution.performances[first] = found
 
 
 def _at_few_harmonics(solution: ForcedSolution, run: again.Run, bodies: Bodies) -> Iterator[_Work]:

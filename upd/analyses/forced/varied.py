@@ -33,6 +33,7 @@ from upd.analyses.forced.again import (
     HARMONICS,
     MESH,
     MODES,
+    MORE_HARMONICS,
     POINTS,
     RECIPE,
     SAMPLES,
@@ -278,7 +279,7 @@ def _of_best(
     parts: Mapping[Key, tuple[ErrorPart, ...]],
 ) -> tuple[ErrorPart, ...]:
     """The best F_C/F_E lies between its neighbours on the curve; its peak is as well known as the
-    worst known one of the run's curves.
+    worst known one of the run's curves, beside what more harmonics change there.
     """
     performance = solution.performances[one.case.stiffness]
     best = performance.best
@@ -291,7 +292,9 @@ def _of_best(
         error = max((max(r, 1.0 / r) for r in beside), default=math.nan) - 1.0
         why = "the next F_C/F_E on either side"
         return (ErrorPart("points of the curve", error, why),) if beside else ()
-    of = q.PEAK_FREQUENCY if quantity == q.BEST_FREQUENCY else q.PEAK_ACCELERANCE
+    of, what = q.PEAK_ACCELERANCE, "height"
+    if quantity == q.BEST_FREQUENCY:
+        of, what = q.PEAK_FREQUENCY, "frequency"
     mine = [
         found
         for (name, case), found in parts.items()
@@ -303,6 +306,12 @@ def _of_best(
         return ()
     worst = max(mine, key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
+    if performance.finer is not None:
+        near, finer = (getattr(point.worst, what) for point in performance.finer)
+        basis = f"change with {MORE_HARMONICS} harmonics more at F_C/F_E {best.ratio:.3g}, "
+        basis += f"factor {_SAFETY:g}"
+        out = [part for part in out if part.source != HARMONICS]
+        out.append(ErrorPart(HARMONICS, _SAFETY * abs(finer / near - 1.0), basis))
     if quantity == q.BEST_REDUCTION and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]
