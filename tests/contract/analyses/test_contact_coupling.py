@@ -158,6 +158,20 @@ def test_loops_that_shake_down_are_closed() -> None:
     assert "loop area" not in failures(solution)
 
 
+def test_a_loop_that_sticks_is_closed_to_rounding() -> None:
+    more = {
+        "contact.friction": 1.5,
+        "loads.normal": ("100 N",),
+        "loads.cycle_amplitude": 1e-3,
+        "geometry.divisions": 4,
+        "want": ("normal", "cycle"),
+    }
+    solution = solved("curved", *more.items())
+    (path,) = (one for one in solution.paths if one.cycle)
+    assert 0.0 < path.most_work < 1e-12 * path.load.max() * path.displacement.max()
+    assert "loop area" not in failures(solution)
+
+
 def test_without_friction_there_is_nothing_to_couple() -> None:
     scene, overrides = TOYS["flat"]
     plan: Any = make_plan(as_scene(scene, {**overrides, **COUPLED, "contact.friction": 0.0}))

@@ -307,11 +307,10 @@ def _of_best(
     worst = max(mine, key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
     if performance.finer is not None:
-        near, finer = (getattr(point.worst, what) for point in performance.finer)
-        basis = f"change with {MORE_HARMONICS} harmonics more at F_C/F_E {best.ratio:.3g}, "
-        basis += f"factor {_SAFETY:g}"
-        out = [part for part in out if part.source != HARMONICS]
-        out.append(ErrorPart(HARMONICS, _SAFETY * abs(finer / near - 1.0), basis))
+        at, (near, finer) = performance.finer[0].ratio, (p.worst for p in performance.finer)
+        error = _SAFETY * abs(getattr(finer, what) / getattr(near, what) - 1.0)
+        basis = f"{MORE_HARMONICS} harmonics more at F_C/F_E {at:.3g}, factor {_SAFETY:g}"
+        out = [*(p for p in out if p.source != HARMONICS), ErrorPart(HARMONICS, error, basis)]
     if quantity == q.BEST_REDUCTION and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]
