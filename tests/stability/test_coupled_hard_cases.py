@@ -13,6 +13,7 @@ from upd.contact import CoupledContact, coupled_contact, normal_contact
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import AskedStep, Iterate
 from upd.contact.load_steps import CoupledHistory
+from upd.contact.rigid_damper import face_forces
 from upd.errors import ConvergenceError, InputError
 from upd.reference import half_space_compliance
 
@@ -154,6 +155,25 @@ def test_wedge_about_the_limit_where_it_holds_itself(part: float, angle: float) 
     assert found.status == "converged"
     assert laws(C, np.zeros(18), mu, found, B, loads) < 1e-9
     assert found.self_locking == (part > 1.0)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("friction", [0.1, 0.6])
+@pytest.mark.parametrize("angle", [30.0, 45.0])
+def test_wedge_that_slides_far(angle: float, friction: float, way: float) -> None:
+    """The right face moves off by a hundred thousand times what the bodies deform: both faces slide
+    the same way, and friction opposes it.
+    """
+    C, B = faces(angle)
+    found = coupled_contact(C, np.zeros(18), friction, load=[10.0, 0.0, 0.0], columns=B)
+    moved = way * np.where(np.arange(36) % 18 < 9, 0.0, B[:, 1])
+    found = found.go_on(load=[10.0, 0.0, 0.0], offset=[moved, 0.0 * moved])
+    assert found.status == "converged"
+    for k, sign in enumerate((way, -way)):
+        # the wedge follows the parting faces up, and is pressed down where they close
+        N = face_forces(angle, angle, 10.0, sign * friction).normal_left
+        assert found.force[k, :9, 0].sum() == pytest.approx(N, rel=1e-7)
+        assert found.force[k, 9:, 0].sum() == pytest.approx(N, rel=1e-7)
 
 
 def test_withdrawn_wedge_that_jams() -> None:

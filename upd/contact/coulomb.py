@@ -139,15 +139,18 @@ class Coulomb(CoulombConditions):
             assert best is not None
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
-        self.near_limit = bool(self.mu.any())
-        answer = (
-            self._newton(step, None, NEWTON_STEPS)
-            if self.near_limit
-            else self._frictionless(step, start)
-        )
-        self.near_limit = False
+        if self.pressed is None:
+            # Bodies that slide by far more than they deform: without friction they are where they
+            # come to be, with it on the same way.
+            answer = self._frictionless(step, start)
+            used += answer.iterations
+        if not answer.converged and self.mu.any():
+            self._forget()
+            self.near_limit = True
+            answer = self._newton(step, None, NEWTON_STEPS)
+            self.near_limit = False
+            used += answer.iterations
         self._forget()
-        used += answer.iterations
         if answer.converged:
             return replace(answer, iterations=used, method="fallback")
         if self.pressed is not None and load is not None:
@@ -387,7 +390,9 @@ class Coulomb(CoulombConditions):
         return answer
 
     def _frictionless(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
-        """Without friction the forces are the one answer of a box QP, which is proven to end."""
+        """Without friction the forces are the one answer of a box QP, which is proven to end; with
+        it Newton starts there.
+        """
         n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
         # forces and moments differ by a length; what moves no normal stays as it is
         size = np.abs(self.B[:n]).max(axis=0)
@@ -409,7 +414,7 @@ class Coulomb(CoulombConditions):
         if step.motion is None:
             s[moved] = found.motion / size[moved]
         forces = np.concatenate((found.x, np.zeros(len(self.C) - n)))
-        # Newton removes the rest of rounding, where a motion is not free.
+        # Without friction Newton removes the rest of rounding, where a motion is not free.
         return self._ended(step, Iterate(forces, s, self.C @ forces - self.B @ s - step.b))
 
     def _ended(self, step: AskedStep, at: Iterate) -> CoupledStep:
