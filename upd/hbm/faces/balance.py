@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.core.newton import Settings
+from upd.hbm.core.newton import Settings, across
 from upd.hbm.faces.corrector import InterfaceCorrector, InterfacePlace
 from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
 from upd.hbm.faces.march import Fallback, InterfaceMarch
@@ -444,9 +444,8 @@ class InterfaceCurve:
 
     def _at_frequency(self, x: FloatArray, f: float) -> InterfacePlace | None:
         """Newton's method at a frequency."""
-        return self.corrector.correct(
-            x, f, self.corrector.across(1.0, x), self.corrector.scale(x), self.equations.split(x)[2]
-        )
+        D, past = self.corrector.scale(x), self.equations.split(x)[2]
+        return self.corrector.correct(x, f, across(x, 1.0), D, past)
 
     def _entered(self, at: InterfacePlace, way: float) -> InterfacePlace:
         """A place kept, with its tangent in the direction of travel, and the first step."""
@@ -470,7 +469,7 @@ class InterfaceCurve:
             mark = float(ahead[np.abs(ahead - at.p).argmin()]) if len(ahead) else np.inf
             hit = abs(mark - at.p) <= h * abs(rate)
             if hit:
-                length, normal = (mark - at.p) / rate, self.corrector.across(rate, at.x)
+                length, normal = (mark - at.p) / rate, across(at.x, rate)
             x = at.x + length * at.tangent[:-1] * D
             p = mark if hit else at.p + length * rate
             found = self.corrector.correct(x, p, normal, D, past, at.known)
@@ -483,7 +482,7 @@ class InterfaceCurve:
                 if stray <= STRAY and not hit and (found.p - mark) * rate > 0.0:
                     # the corrector has passed a frequency that is asked for
                     x = at.x + (mark - at.p) / (found.p - at.p) * (found.x - at.x)
-                    normal = self.corrector.across(rate, at.x)
+                    normal = across(at.x, rate)
                     found = self.corrector.correct(x, mark, normal, D, past, found.known)
                     at = self.corrector.widened(at)
                 if found is not None and stray <= STRAY:
@@ -517,7 +516,6 @@ class InterfaceCurve:
             while load < 1.0:
                 trial = min(load + step, 1.0)
                 e.drive = trial * whole
-                e.forget()
                 found = self._at_frequency(e.joined(q, rigid, slip), f)
                 if found is None:
                     step = 0.5 * (trial - load)
@@ -528,5 +526,4 @@ class InterfaceCurve:
                 step *= 2.0 if found.iterations <= self.settings.wanted_iterations else 1.0
         finally:
             e.drive = whole
-            e.forget()
         return found

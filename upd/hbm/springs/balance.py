@@ -118,12 +118,13 @@ class Balance:
         """
         return self.modal, self.Psi
 
-    def has_part(self, harmonic: int) -> bool:
-        """Whether the linear system is known in a harmonic above 0."""
-        return True
-
     def require_all_sectors(self, what: str) -> None:
         """Raise InputError where this is one sector of a travelling wave."""
+        if not self.linear.symmetric:
+            raise InputError(
+                f"{what}: one sector of a travelling wave is not enough; to fix it: give the "
+                "problem of all sectors, see upd.hbm.all_sectors"
+            )
 
     def modal_row(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
         """Row on the modes (m,) of a row (n_dof,) that weighs the displacements.
@@ -273,6 +274,7 @@ class Balance:
         residual : (n,) ndarray
             [mm], and [N] for the rigid equilibrium in modal coordinates.
         jacobian : BalanceJacobian or None
+            None where it is not finite, too.
         by_frequency : (n,) ndarray
             Derivative by the angular frequency; zero unless asked for.
         """
@@ -286,7 +288,7 @@ class Balance:
         if not jacobian:
             return residual, None, by_frequency
         parts = BalanceJacobian(linear, linear.k * omega, state, self.stuck_stiffness, DF)
-        return residual, parts, by_frequency
+        return residual, parts if np.isfinite(DF).all() else None, by_frequency
 
     def contact_terms(
         self, x: FloatArray, jacobian: bool
@@ -298,11 +300,6 @@ class Balance:
         return contact_terms(  # type: ignore[no-any-return]
             W, self._transform, self.harmonics.static, law, begin, jacobian
         )
-
-    def forget_factors(self) -> None:
-        """Let the factors go that corrections keep for later ones: their memory."""
-        if "linear" in self.__dict__:
-            self.linear.kept.forget()
 
     @cached_property
     def linear(self) -> LinearPart:

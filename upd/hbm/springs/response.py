@@ -396,7 +396,7 @@ def response_of(
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     with threads_for(b.size):
         b, curve = solve_curve(b, order, fast_exits, settings)
-        b.forget_factors()
+        b.linear.kept.forget()
         return _answer(b, curve)
 
 
@@ -407,8 +407,10 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
     status = "not periodic" if curve.status == "complete" and astray else curve.status
     notes = []
     if worst > TRUNCATION:
+        h = b.harmonics
+        omitted = [*(str(k) for k in range(h.highest) if k not in h.numbers), f"above {h.highest}"]
         notes.append(
-            f"the omitted harmonics ({_omitted(b.harmonics)}) would move the contacts by up to "
+            f"the omitted harmonics ({', '.join(omitted)}) would move the contacts by up to "
             f"{100.0 * worst:.3g} %: take more harmonics"
         )
     if astray:
@@ -435,11 +437,6 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
         status=cast(Status, status),
         message="; ".join([curve.message, *notes]),
     )
-
-
-def _omitted(h: Harmonics) -> str:
-    between = [k for k in range(h.highest) if k not in h.numbers]
-    return ", ".join([*map(str, between), f"above {h.highest}"])
 
 
 class GivenSystem(NamedTuple):
