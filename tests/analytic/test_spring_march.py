@@ -198,7 +198,7 @@ def test_a_sweep_without_slip_is_the_linear_answer(solution: ForcedSolution) -> 
     # what a period is marched again from
     assert flat.harmonics.shape == (4, 1, flat.amplitude.shape[1])
     assert flat.harmonics[:, 0] == pytest.approx(flat.amplitude)
-    again = flat.starts[2].copy()
+    again = flat.points[2].start.copy()
     out = InterfaceMarch(flat.model, f[2], flat.drive, flat.samples).period(again).output
     n = flat.samples
     z = 2.0 / n * np.exp(-2j * np.pi * np.arange(1, n + 1) / n) @ out

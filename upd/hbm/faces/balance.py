@@ -251,17 +251,21 @@ def read_point(e: InterfaceEquations, period: ContactPeriod, frequency: float) -
     -------
     InterfacePoint
     """
-    nodes = np.array([(period.state == code).mean(axis=0) for code in (OPEN, STICK, SLIP)]).T
-    loss = _rubbed(e, period)
+    model, nodes = e.model, [(period.state == code).mean(axis=0) for code in (OPEN, STICK, SLIP)]
+    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
+    lost = (mean * period.relative).sum(axis=0).reshape(3, -1)[1:].sum(axis=0)
+    loss = np.asarray(model.copies * lost)
+    seen = period.q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
+    seen = seen + e.drive @ model.seen_drive.T
     return InterfacePoint(
         frequency,
         period.q,
         period.rigid_before,
         period.slip_before,
-        _outputs(e, period),
-        nodes.mean(axis=0),
+        np.concatenate([seen[:1], seen[1::2] - 1j * seen[2::2]]),
+        np.mean(nodes, axis=1),
         np.append(_energy(e, period), loss.sum()),
-        nodes,
+        np.array(nodes).T,
         loss,
         _unresolved(e, period),
     )
@@ -277,24 +281,6 @@ def _unresolved(e: InterfaceEquations, period: ContactPeriod) -> float:
     if moved == 0.0:
         return 0.0
     return float(np.linalg.norm(model.shapes @ (modal / resistance).T)) / moved
-
-
-def _rubbed(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
-    """Lost by friction at each node, of the whole [N mm]."""
-    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
-    lost = (mean * period.relative).sum(axis=0).reshape(3, -1)[1:].sum(axis=0)
-    return np.asarray(e.model.copies * lost)
-
-
-def _outputs(e: InterfaceEquations, period: ContactPeriod) -> ComplexArray:
-    """(H + 1, K) harmonics of the outputs."""
-    model = e.model
-    real = period.q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
-    real = real + e.drive @ model.seen_drive.T
-    out = np.zeros((e.highest + 1, real.shape[1]), complex)
-    out[0] = real[0]
-    out[1:] = real[1::2] - 1j * real[2::2]
-    return out
 
 
 def _energy(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:

@@ -143,7 +143,8 @@ class LinearPart:
             )
             return found
         (loads, u0, rigid_load), o, w = acting, self.offset, self.k * omega
-        eta = self.modal.solve(w, loads - self.pushes(_complex_part(F, o)))
+        force = np.asarray((F[:, o::2] - 1j * F[:, o + 1 :: 2]).T)
+        eta = self.modal.solve(w, loads - self.pushes(force))
         mean = u0 - self.G0 @ F[:, 0] + self.R @ a
         left = W - real_part(self.moves(eta), mean, o)
         below = self.R.T @ F[:, 0] - rigid_load if o else a
@@ -261,11 +262,6 @@ class BalanceJacobian(NamedTuple):
         return J
 
 
-def _complex_part(X: FloatArray, o: int) -> ComplexArray:
-    """Amplitudes a - i b (n_k, c) of coefficients (c, size), the first at column o."""
-    return np.asarray((X[:, o::2] - 1j * X[:, o + 1 :: 2]).T)
-
-
 def real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
     """Coefficients of amplitudes and a mean.
 
@@ -378,8 +374,9 @@ class Eliminated(CondensedFactors):
         scaled = normal[:n].reshape(c, size)
         self.V = scaled[s] / D[:n].reshape(c, size)[s]
         # the border on the held points is one on the forces of the others
-        q = np.einsum("ks,ksm->km", _complex_part(self.V, of.offset).conj(), self.across)
-        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
+        o = of.offset
+        q = np.einsum("sk,ksm->km", self.V[:, o::2] + 1j * self.V[:, o + 1 :: 2], self.across)
+        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), o)
         column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
         border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
         across = np.concatenate([scaled[m].T.ravel(), border_rigid])

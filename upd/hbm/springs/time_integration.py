@@ -217,7 +217,9 @@ def steady_state(
     omega = 2 * np.pi * frequency
     dt = 2 * np.pi / omega / steps
     state = _initial(b, omega, x)
-    load = _load(b, steps)
+    theta = 2 * np.pi * np.arange(steps + 1) / steps
+    waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
+    load = np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)
     m = len(b.modal.eigenvalues)
     damping = np.diag(b.modal.damping) if b.modal.proportional else b.modal.damping
     beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
@@ -275,9 +277,3 @@ def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
     T = np.zeros((len(force), 2))
     T[:, : b.contacts.tangents] = force[:, 1:]
     return displacement, velocity, acceleration, b.Psi @ displacement, force.ravel(), T
-
-
-def _load(b: Balance, steps: int) -> FloatArray:
-    theta = 2 * np.pi * np.arange(steps + 1) / steps
-    waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
-    return np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)
