@@ -67,6 +67,8 @@ class Balance:
         Synthesis matrix.
     Q : (size, samples) ndarray
         Analysis matrix.
+    transform : tuple of ndarray
+        E, its transpose, Q and its transpose, as compiled loops take them.
     loads : (n_k, m) ndarray of complex
         Dynamic loads on the modes.
     G0 : (c, c) ndarray
@@ -88,6 +90,7 @@ class Balance:
     Psi: FloatArray = field(init=False)
     E: FloatArray = field(init=False)
     Q: FloatArray = field(init=False)
+    transform: tuple[FloatArray, ...] = field(init=False)
     loads: ComplexArray = field(init=False)
     G0: FloatArray = field(init=False)
     u0: FloatArray = field(init=False)
@@ -96,11 +99,13 @@ class Balance:
     def __post_init__(self) -> None:
         Phi, free = self.modal.Phi, ~self.modal.rigid
         Psi = np.ascontiguousarray(self.contacts.B @ Phi)
+        E, Q = (of(self.harmonics, self.samples) for of in (synthesis, analysis))
         flexible = Psi[:, free] / self.modal.eigenvalues[free]
         values = {
             "Psi": Psi,
-            "E": synthesis(self.harmonics, self.samples),
-            "Q": analysis(self.harmonics, self.samples),
+            "E": E,
+            "Q": Q,
+            "transform": (E, np.ascontiguousarray(E.T), Q, np.ascontiguousarray(Q.T)),
             "loads": self.dynamic @ Phi,
             "G0": flexible @ Psi[:, free].T,
             "u0": flexible @ (Phi[:, free].T @ self.static),
@@ -298,7 +303,7 @@ class Balance:
         begin = (START_CODE[self.start], slider, MOST_PERIODS)
         W, law = self.split(x)[0], self.contacts.law.arrays
         return contact_terms(  # type: ignore[no-any-return]
-            W, self._transform, self.harmonics.static, law, begin, jacobian
+            W, self.transform, self.harmonics.static, law, begin, jacobian
         )
 
     @cached_property
@@ -313,12 +318,6 @@ class Balance:
     def _each_harmonic(self) -> tuple[Modal, FloatArray]:
         """The linear system and the rows on its modes, for all harmonics above 0."""
         return self.modal, self.Psi
-
-    @cached_property
-    def _transform(self) -> tuple[FloatArray, ...]:
-        """Synthesis and analysis matrices as compiled loops take them."""
-        E, Q = self.E, self.Q
-        return E, np.ascontiguousarray(E.T), Q, np.ascontiguousarray(Q.T)
 
     def amplitudes(self, F: FloatArray, omega: float) -> ComplexArray:
         """Amplitudes (n_k, m) of the modes under the loads and contact forces F (c, size) [N]."""

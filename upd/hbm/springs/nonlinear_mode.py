@@ -324,7 +324,9 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     stuck, omegas_stuck, number = stuck_modes(b, mode)
     shape, omega = stuck[:, number], float(omegas_stuck[number])
     of = ExtendedBalance(b, shape, omega)
-    problem = PathProblem(of.function, of.scale, settings=s, shown=_amplitude)
+    problem = PathProblem(
+        of.function, of.scale, settings=s, shown=lambda log_a: f"amplitude {np.exp(log_a):.6g}"
+    )
     begin = wanted[0]
     for _ in range(HALVINGS):
         first = problem.solve(of.guess(begin), begin)
@@ -359,10 +361,6 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
         stuck_omega=omegas_stuck,
         number=number,
     )
-
-
-def _amplitude(log_a: float) -> str:
-    return f"amplitude {np.exp(log_a):.6g}"
 
 
 def _over(problem: PathProblem, x: FloatArray, begin: float, wanted: FloatArray) -> Path:

@@ -105,8 +105,7 @@ def climb(
         For a harmonic that is not kept, or a row of another length.
     """
     modal_row, j = b.modal_row(row, harmonic), b.harmonics.place(harmonic)
-    p_scale = FREQUENCY_SHARE * frequency
-    problem = over_frequency(b, p_scale, settings)
+    problem = over_frequency(b, FREQUENCY_SHARE * frequency, settings)
     k = int(b.harmonics.dynamic[j])
     modal, Psi = b.part(k)
 
@@ -117,7 +116,7 @@ def climb(
 
     def slope(at: State, D: FloatArray) -> float:
         """Of the weighed amplitude along the tangent, by central differences."""
-        h, dx, dp = EPS ** (1 / 3), at.tangent[:-1] * D, float(at.tangent[-1] * p_scale)
+        h, dx, dp = EPS ** (1 / 3), at.tangent[:-1] * D, float(at.tangent[-1] * problem.p_scale)
         up, down = (
             amplitude(at.x + d * dx, at.p + d * dp) * (at.p + d * dp) ** power for d in (h, -h)
         )
@@ -138,7 +137,7 @@ def climb(
             here = there
             continue
         way = np.linalg.norm((there.x - here.x) / problem.scale(here.x))
-        length = float(np.hypot(way, (there.p - here.p) / p_scale))
+        length = float(np.hypot(way, (there.p - here.p) / problem.p_scale))
         top = _between(problem, slope, here, length)
         if top is not None:
             return peak(top, "found")
