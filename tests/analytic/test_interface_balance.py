@@ -374,16 +374,16 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     want = e.march(x, w)
     real, asked = module.given_blades, []
 
-    def giving_up(first: int, given: bool, known: bool, pushes: Any, *rest: Any) -> int:
+    def giving_up(first: int, given: bool, pushes: Any, *rest: Any) -> int:
         asked.append((first, given))
         if first == 0:
-            real(0, given, known, pushes[:20], *rest)
+            real(0, given, pushes[:20], *rest)
             # the sample beyond on copies: leaves x0 as a sample that fails does
             ahead = copied(rest)
-            real(20, False, known, pushes[:21], *ahead)
-            rest[-1][:] = ahead[-1]
+            real(20, False, pushes[:21], *ahead)
+            rest[-1][-1][:] = ahead[-1][-1]
             return 20
-        return int(real(first, given, known, pushes, *rest))
+        return int(real(first, given, pushes, *rest))
 
     monkeypatch.setattr(module, "given_blades", giving_up)
     # another drive: the period is not the one that is known

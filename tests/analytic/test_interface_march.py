@@ -679,13 +679,13 @@ def copied(one: Any) -> Any:
     return one.copy() if isinstance(one, np.ndarray) else one
 
 
-def stuck_at(sample: int, *rest: Any) -> int:
+def stuck_at(sample: int, parts: Any, bases: Any, which: Any, *rest: Any) -> int:
     """The steps up to this one, left as they are where it has no answer."""
-    march_steps(0, sample, False, *rest)
+    march_steps(0, False, parts, bases, which[:sample], *rest)
     # the step beyond on copies: leaves x0 as a step that fails does
-    ahead = [copied(one) for one in rest]
-    march_steps(sample, sample + 1, False, *ahead)
-    rest[6][:] = ahead[6]
+    ahead = copied(rest)
+    march_steps(sample, False, parts, bases, which[: sample + 1], *ahead)
+    rest[-1][0][:] = ahead[-1][0]
     return sample
 
 
@@ -716,9 +716,9 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     want = march.period(want_at)
     real, asked = module.march_steps, []
 
-    def giving_up(first: int, last: int, given: bool, *rest: Any) -> int:
+    def giving_up(first: int, given: bool, *rest: Any) -> int:
         asked.append(given)
-        return stuck_at(20, *rest) if first == 0 else int(real(first, last, given, *rest))
+        return stuck_at(20, *rest) if first == 0 else int(real(first, given, *rest))
 
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
     march.rebase(np.arange(model.n) % 2 == 0)

@@ -361,12 +361,10 @@ class InterfaceEquations:
         end, x0 = rigid.copy(), np.zeros(3 * n)
         done, given = 0, False
         rigid_rows = np.ascontiguousarray(step.Z[:, m : m + r].T)
-        parts = (rigid_rows, step.W, model.columns, step.J)
-        law, past = (model.friction, step.rho_n, step.rho_t), (F, Y, S, *self.kept)
+        parts = (rigid_rows, step.W, model.columns, step.J, model.load)
+        law, past = (model.friction, step.rho_n, step.rho_t), (known is not None, F, Y, S)
         while True:
-            done = given_blades(
-                done, given, known is not None, pushes, parts, law, model.load, end, c, past, x0
-            )
+            done = given_blades(done, given, pushes, parts, law, (*past, *self.kept), (end, c, x0))
             if done == N:
                 break
             given = True
