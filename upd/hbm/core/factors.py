@@ -120,16 +120,12 @@ class Factors:
         self.sign = 1.0 if (swaps + negative) % 2 == 0 else -1.0
         self.ratio = max(float(size.min() / size.max()), EPS)
 
-    def _condensed(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled unknowns of the factored equations."""
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
         right = np.empty(len(self.rows) + 1)
         np.divide(r, self.rows, out=right[:-1])
         right[-1] = last
         return np.asarray(lapack.dgetrs(self.lu, self.piv, right, overwrite_b=True)[0])
-
-    def solve(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        return self._condensed(r, last)
 
     def tangent(self) -> FloatArray:
         """Unit vector along the path, on the side the border points to."""

@@ -128,7 +128,6 @@ def interface_response(
     samples: int = 128,
     settings: Settings | None = None,
     fallback: Fallback | None = None,
-    workers: int | None = None,
 ) -> InterfaceResponse:
     """Follow the curve from the first to the last frequency, through all of them.
 
@@ -153,8 +152,6 @@ def interface_response(
         Step control of the continuation.
     fallback : callable, optional
         As for `upd.hbm.faces.march.InterfaceMarch`.
-    workers : int, optional
-        Threads; by default all that libraries may use. The answer is the same with any number.
 
     Returns
     -------
@@ -176,7 +173,7 @@ def interface_response(
             "in Hz"
         )
     s = settings or replace(Settings(), tolerance=TOLERANCE, smallest_step=SHORTEST)
-    with SideBySide(threads_used() if workers is None else workers) as beside:
+    with SideBySide(threads_used()) as beside:
         equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
         equations.beside = beside
         curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))

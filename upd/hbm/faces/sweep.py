@@ -151,7 +151,7 @@ def stepped_sine(
     k, K = len(points), len(model.seen_modes)
     return SteppedSine(
         f[:k],
-        np.array([p.first_harmonic for p in points]).reshape(k, K),
+        np.array([p.harmonics[0] for p in points]).reshape(k, K),
         np.array([p.last.counts for p in points]).reshape(k, 3),
         np.array([p.settled for p in points], bool),
         np.array([p.last.energy for p in points]).reshape(k, 3),
@@ -311,11 +311,6 @@ class SteadyPoint:
     seconds: float
     harmonics: ComplexArray
     start: InterfaceState
-
-    @property
-    def first_harmonic(self) -> ComplexArray:
-        """(K,) of every output, the lowest harmonic that is excited."""
-        return np.asarray(self.harmonics[0])
 
 
 def settle(

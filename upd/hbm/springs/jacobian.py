@@ -334,7 +334,7 @@ class EveryPoint(CondensedFactors):
 
     def solve(self, r: FloatArray, last: float) -> FloatArray:
         """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        found = self._condensed(self._by_coefficient(r), last)
+        found = super().solve(self._by_coefficient(r), last)
         out = found.copy()
         out[: self.n].reshape(self.c, self.size)[:] = found[: self.n].reshape(self.size, self.c).T
         return out
@@ -403,7 +403,7 @@ class Eliminated(CondensedFactors):
         """Scaled correction for the residual r (n,) and the right-hand side of the border."""
         n, c, size, static = self.n, self.c, self.size, self.static
         right, share, inside = self._reduced(r[:n].reshape(c, size), r[n:])
-        found = self._condensed(right, last - share)
+        found = super().solve(right, last - share)
         k, D = size * len(self.m), self.D[:n].reshape(c, size)
         out, p = np.empty(len(r) + 1), float(found[-1])
         w = found[:k].reshape(size, len(self.m)).T
@@ -470,7 +470,7 @@ class LowRank(CondensedFactors):
         moved = by_harmonic(self.G, self.G0, self.static, f)
         below = r[n:] - self.R.T @ f[:, 0]
         right = np.concatenate([(inside - moved).T.ravel(), below])
-        found = self._condensed(right, last - float((self.border * left).sum()))
+        found = super().solve(right, last - float((self.border * left).sum()))
         k = size * U.shape[1]
         y = (found[:k] * self.unit).reshape(size, -1).T
         out = np.empty(len(r) + 1)

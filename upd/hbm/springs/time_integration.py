@@ -216,15 +216,11 @@ def steady_state(
     b.require_all_sectors("time integration")
     omega = 2 * np.pi * frequency
     dt = 2 * np.pi / omega / steps
-    state, linear = _initial(b, omega, x), _linear(b, dt, float(alpha))
-    theta = 2 * np.pi * np.arange(steps + 1) / steps
-    waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
-    load = np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)
+    state, load, linear = _initial(b, omega, x), _load(b, steps), _linear(b, dt, float(alpha))
     (c, m), law = b.Psi.shape, b.contacts.law
     W, F, X = np.zeros((c, steps)), np.zeros((c, steps)), np.zeros((m, steps))
     # contact stiffness against that of a step multiplies the rounding of the displacement
-    stiff = float(np.abs(linear[-1]).max() * max(law.k_n.max(), law.k_t.max()))
-    tolerated = 1e4 * EPS * (1 + stiff)
+    tolerated = 1e4 * EPS * (1 + np.abs(linear[-1]).max() * max(law.k_n.max(), law.k_t.max()))
     d1, out = 1 + b.contacts.tangents, (W, F, X)
     change, status, period, before = np.inf, "period limit", 0, np.zeros_like(X)
     while period < most_periods:
@@ -238,15 +234,19 @@ def steady_state(
             status = "periodic"
             break
         before = X.copy()
+    message = f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz"
+    message += f", last change {change:.1e}"
     shape = (b.contacts.n_point, d1, steps)
-    message = (
-        f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz, last change "
-        f"{change:.1e}"
-    )
     coefficients = b.modal.Phi @ (X @ analysis(b.harmonics, steps).T)
     return SteadyState(
         coefficients, W.reshape(shape), F.reshape(shape), period, change, status, message
     )
+
+
+def _load(b: Balance, steps: int) -> FloatArray:
+    theta = 2 * np.pi * np.arange(steps + 1) / steps
+    waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
+    return np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)
 
 
 def _linear(b: Balance, dt: float, alpha: float) -> tuple[FloatArray, ...]:
