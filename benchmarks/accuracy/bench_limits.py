@@ -240,7 +240,7 @@ def scaled(name: str, built: Rig) -> Iterator[Row]:
         note = f"balance, largest of {k} points to {f:g} Hz{same}"
         yield told("scaling", case, float(off.max()), "", 1e-9, note)
         a, b = (
-            settled(m, f, s * force, at).first_harmonic[RIGHT]
+            settled(m, f, s * force, at).harmonics[0, RIGHT]
             for (m, at), s in ((springs_at_rest(built), 1.0), (springs_at_rest(many), SCALE))
         )
         yield told("scaling", case, abs(b / a / SCALE - 1.0), "", 1e-9, f"march, {f:g} Hz")
@@ -309,7 +309,7 @@ def whole_faces(name: str) -> Iterator[Row]:
             at, force = rest.copy(), F / LARGE
             one = settled(model, f, force, at)
             linear = model.linear_response([f], [force], stuck=True)[0, RIGHT]
-            off = 100.0 * (abs(one.first_harmonic[RIGHT]) / abs(linear) - 1.0)
+            off = 100.0 * (abs(one.harmonics[0, RIGHT]) / abs(linear) - 1.0)
             note = (
                 f"march against the glued linear answer; sticking {100 * one.last.counts[1]:.0f} %"
             )
@@ -319,14 +319,14 @@ def whole_faces(name: str) -> Iterator[Row]:
     for f in (290.0, 305.0):
         one = settled(loose, f, 1.0, start.copy())
         linear = loose.linear_response([f], [1.0], stuck=False)[0, RIGHT]
-        off = 100.0 * (abs(one.first_harmonic[RIGHT]) / abs(linear) - 1.0)
+        off = 100.0 * (abs(one.harmonics[0, RIGHT]) / abs(linear) - 1.0)
         where = f"{case}, F_C/F_E {SMALL:g}, {f:g} Hz"
         yield told("free_accelerance", where, off, "%", 0.1, "march against the free blade")
     f, force = found[MODES[0]][False], F / RATIOS[0]
     big, at = made(SCALE * F)
     a = settled(model, f, force, rest.copy())
     b = settled(big, f, SCALE * force, at)
-    off = abs(b.first_harmonic[RIGHT] / a.first_harmonic[RIGHT] / SCALE - 1.0)
+    off = abs(b.harmonics[0, RIGHT] / a.harmonics[0, RIGHT] / SCALE - 1.0)
     share = ", ".join(f"{100 * p:.1f} %" for p in a.last.counts)
     where = f"{case}, F_C/F_E {RATIOS[0]:g}, loads times {SCALE:g}"
     yield told("scaling", where, off, "", 1e-9, f"march, {f:.1f} Hz; open, stick, slip {share}")

@@ -102,7 +102,7 @@ def explicitly(name: str, built: Rig, full: ExplicitMarch, ratio: float, f: floa
     springs = make_springs(built.plan, built.model)
     state = springs.at_rest()
     point = settled(springs, f, force, state)
-    mine = abs(point.first_harmonic[RIGHT])
+    mine = abs(point.harmonics[0, RIGHT])
     found, periods, change = full.steady(f, force, full.at(springs, state, force))
     truth = abs(found[RIGHT])
     fresh = ""
@@ -153,7 +153,7 @@ def against(
 ) -> float:
     """Per cent of a finer march."""
     point = settled(springs, f, force, at.copy(), steps)
-    return float(100.0 * (abs(point.first_harmonic[RIGHT]) / truth - 1.0))
+    return float(100.0 * (abs(point.harmonics[0, RIGHT]) / truth - 1.0))
 
 
 def with_more_modes(
@@ -195,7 +195,7 @@ def balanced(name: str, built: Rig, ratio: float) -> Iterator[Row]:
     grid = np.unique(np.concatenate([np.linspace(e.start, e.stop, 111), asked]))
     answers = {h: respond(plan, model, force, grid, harmonics=range(h + 1)) for h in HARMONICS}
     for f in asked:
-        fresh = abs(settled(springs, f, force, springs.at_rest()).first_harmonic[RIGHT])
+        fresh = abs(settled(springs, f, force, springs.at_rest()).harmonics[0, RIGHT])
         off, rest, why = {}, {}, ""
         for h, answer in answers.items():
             at = np.flatnonzero(np.isclose(answer.frequency, f, rtol=1e-9, atol=0.0))
@@ -206,7 +206,7 @@ def balanced(name: str, built: Rig, ratio: float) -> Iterator[Row]:
             here = float(answer.amplitude(model.row("right"))[i])
             state = state_at(springs, model, answer.balance, answer.x[i], f, force)
             one = settled(springs, f, force, state)
-            there = abs(one.first_harmonic[RIGHT])
+            there = abs(one.harmonics[0, RIGHT])
             off[h] = float(100.0 * (here / there - 1.0))
             rest[h] = float(100.0 * (there / fresh - 1.0))
         case = f"{name}, F_C/F_E {ratio:g}, {f:g} Hz"

@@ -181,7 +181,7 @@ def test_the_march_settles_where_another_does_in_either_harmonic() -> None:
         point = settle(march, at, 1e-4, 400)
         assert point.settled and point.last.counts[2] > 0.0
         size = (2.0 * np.pi * k * f) ** 2 * 1e-3 / SLIPPING
-        marched.append(size * np.abs(point.first_harmonic[: len(SIDES)]))
+        marched.append(size * np.abs(point.harmonics[0, : len(SIDES)]))
         other = steady_state(found.balance, f, found.x[0], steps=512 * k)
         wanted = [other.amplitude(model.row(s), found.harmonics.place(k)) for s in SIDES]
         assert marched[-1] == pytest.approx(size * np.array(wanted), rel=4e-3)

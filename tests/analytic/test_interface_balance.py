@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import upd.hbm.core.kept_factors as kept_factors
+import upd.hbm.core.factors as core_factors
+import upd.hbm.faces.balance as balance
 import upd.hbm.faces.corrector as corrector
 import upd.hbm.faces.equations as module
 import upd.hbm.faces.newton as linear
@@ -18,7 +19,7 @@ from upd.analyses.forced.interface_model import by_coulomb, make_interface_model
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.core.newton import Settings
+from upd.hbm.core.newton import Settings, across
 from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.equations import InterfaceEquations
 from upd.hbm.faces.newton import InterfaceEvaluation
@@ -110,7 +111,7 @@ def test_derivative_against_differences() -> None:
             if (up.period.state != down.period.state).any():
                 continue
             want = 0.5 * (up.residual - down.residual)
-            have = found.jacobian @ d + found.by_w * dw
+            have = found.derivative @ np.append(d, dw)
             for part in (slice(0, h * m), slice(h * m, None)):
                 # differences, and the samples' misfit of 1e-11 of their forces
                 noise = 1e-11 * np.abs(e.Q @ found.period.modal).max() if part.start == 0 else 0.0
@@ -130,7 +131,7 @@ def test_one_direction_is_that_of_the_derivative() -> None:
     found, d, dw = evaluate(e, x, w, e.start.slip), 1e-3 * x, 1e-3 * w
     assert not found.linear.inverted
     by_factors = found.in_direction(d, dw)
-    want = found.jacobian @ d + found.by_w * dw
+    want = found.derivative @ np.append(d, dw)
     assert found.linear.inverted
     for have in (by_factors, found.in_direction(d, dw)):
         np.testing.assert_allclose(have, want, rtol=0.0, atol=1e-9 * np.abs(want).max())
@@ -150,7 +151,7 @@ def test_curve_by_few_directions_is_that_by_derivatives(monkeypatch: pytest.Monk
         monkeypatch.setattr(linear.InterfaceEvaluation, "factored", told)
         monkeypatch.setattr(corrector, "MANY", many)
         # factors of so few unknowns are quick; here they are to be kept all the same
-        monkeypatch.setattr(kept_factors, "SOLUTIONS", 4.0)
+        monkeypatch.setattr(core_factors, "SOLUTIONS", 4.0)
         found.append(response(frequencies, F_C / 300.0, samples=64))
         formed.append(len(count))
     assert formed[1] < 0.7 * formed[0], formed
@@ -175,9 +176,9 @@ def test_steps_that_grow_near_a_known_point_end(
 
     monkeypatch.setattr(corrector.PlaneSteps, "next", grown)
     of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-12), 1.0)
-    known = of.factors_at(evaluate(e, x, w), of.across(1.0, x), of.scale(x))
+    known = of.factors_at(evaluate(e, x, w), across(x, 1.0), of.scale(x))
     assert known is not None
-    start = (x, w / (2.0 * np.pi), of.across(1.0, x), of.scale(x), e.split(x)[2])
+    start = (x, w / (2.0 * np.pi), across(x, 1.0), of.scale(x), e.split(x)[2])
     assert of.correct(*start, known if near else None) is None
     assert len(sizes) == taken
 
@@ -189,7 +190,7 @@ def test_newton_is_quadratic() -> None:
 
     def corrected(x: np.ndarray) -> np.ndarray:
         found = evaluate(e, x, w)
-        return x - np.linalg.solve(found.jacobian, found.residual)
+        return x - np.linalg.solve(found.derivative[:, :-1], found.residual)
 
     for _ in range(3):
         x = corrected(x)
@@ -234,7 +235,7 @@ def test_a_node_out_of_the_equations_comes_in() -> None:
     x = e.joined(q, rigid, slip)
     assert e.march(x, w).moving.any()
     of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-6), 1.0)
-    found = of.correct(x, w / (2.0 * np.pi), of.across(1.0, x), of.scale(x), slip)
+    found = of.correct(x, w / (2.0 * np.pi), across(x, 1.0), of.scale(x), slip)
     assert found is not None and e.mobile.any() and len(found.x) > len(x)
 
 
@@ -251,7 +252,8 @@ def test_answers_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.Monk
     monkeypatch.setattr(linear, "march_directions", told)
     for workers in (1, 2):
         used.clear()
-        found.append(response([436.0, 444.0, 447.0], F_C / 300.0, samples=64, workers=workers))
+        monkeypatch.setattr(balance, "threads_used", lambda count=workers: count)
+        found.append(response([436.0, 444.0, 447.0], F_C / 300.0, samples=64))
         assert len(used - {get_ident()}) == (workers if workers > 1 else 0)
     np.testing.assert_array_equal(found[0].frequency, found[1].frequency)
     np.testing.assert_array_equal(found[0].amplitude, found[1].amplitude)
@@ -374,25 +376,26 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     want = e.march(x, w)
     real, asked = module.given_blades, []
 
-    def giving_up(first: int, given: bool, known: bool, pushes: Any, *rest: Any) -> int:
+    def giving_up(first: int, given: bool, pushes: Any, *rest: Any) -> int:
         asked.append((first, given))
         if first == 0:
-            real(0, given, known, pushes[:20], *rest)
+            real(0, given, pushes[:20], *rest)
             # the sample beyond on copies: leaves x0 as a sample that fails does
             ahead = copied(rest)
-            real(20, False, known, pushes[:21], *ahead)
-            rest[-1][:] = ahead[-1]
+            real(20, False, pushes[:21], *ahead)
+            rest[-1][-1][:] = ahead[-1][-1]
             return 20
-        return int(real(first, given, known, pushes, *rest))
+        return int(real(first, given, pushes, *rest))
 
     monkeypatch.setattr(module, "given_blades", giving_up)
-    e.forget()
+    # another drive: the period is not the one that is known
+    e.drive = e.drive.copy()
     found = e.march(x, w)
     assert asked == [(0, False), (20, True)]
     size = np.abs(want.force).max()
     np.testing.assert_allclose(found.force, want.force, rtol=0.0, atol=1e-8 * size)
     e.fallback = None
-    e.forget()
+    e.drive = e.drive.copy()
     with pytest.raises(ConvergenceError, match=r"447 Hz .* more samples"):
         e.march(x, w)
 

@@ -557,7 +557,7 @@ def test_springs_that_slide_lose_what_a_jenkins_element_does() -> None:
     model, start = jenkins(mu)
     found = stepped_sine(model, [50.0, 58.0], [300.0], start, samples=256, tolerance=1e-5)
     march = [InterfaceMarch(model, f, [300.0], 256) for f in found.frequency]
-    each = [one.period(at.copy()) for one, at in zip(march, found.starts, strict=True)]
+    each = [one.period(p.start.copy()) for one, p in zip(march, found.points, strict=True)]
     X = np.array([0.5 * np.ptp(one.output[:, 0]) for one in each])
     assert found.status == "settled" and X.min() > 3.0 * mu * N / k
     np.testing.assert_allclose(found.energy[:, 2], 4.0 * mu * N * (X - mu * N / k), rtol=2e-3)
@@ -679,13 +679,13 @@ def copied(one: Any) -> Any:
     return one.copy() if isinstance(one, np.ndarray) else one
 
 
-def stuck_at(sample: int, *rest: Any) -> int:
+def stuck_at(sample: int, parts: Any, bases: Any, which: Any, *rest: Any) -> int:
     """The steps up to this one, left as they are where it has no answer."""
-    march_steps(0, sample, False, *rest)
+    march_steps(0, False, parts, bases, which[:sample], *rest)
     # the step beyond on copies: leaves x0 as a step that fails does
-    ahead = [copied(one) for one in rest]
-    march_steps(sample, sample + 1, False, *ahead)
-    rest[6][:] = ahead[6]
+    ahead = copied(rest)
+    march_steps(sample, False, parts, bases, which[: sample + 1], *ahead)
+    rest[-1][0][:] = ahead[-1][0]
     return sample
 
 
@@ -716,9 +716,9 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     want = march.period(want_at)
     real, asked = module.march_steps, []
 
-    def giving_up(first: int, last: int, given: bool, *rest: Any) -> int:
+    def giving_up(first: int, given: bool, *rest: Any) -> int:
         asked.append(given)
-        return stuck_at(20, *rest) if first == 0 else int(real(first, last, given, *rest))
+        return stuck_at(20, *rest) if first == 0 else int(real(first, given, *rest))
 
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
     march.rebase(np.arange(model.n) % 2 == 0)
@@ -740,8 +740,8 @@ def test_too_few_periods_are_told() -> None:
     model, start = worn()
     found = stepped_sine(model, [453.0, 440.0], [-1j], start, most_periods=20)
     assert found.status == "not settled" and not found.settled.any()
-    assert "2 of 2" in found.message and (found.periods == 20).all()
-    assert (found.highest > found.lowest).all()
+    assert "2 of 2" in found.message and all(p.periods == 20 for p in found.points)
+    assert all((p.highest > p.lowest).all() for p in found.points)
     march, at = InterfaceMarch(model, 440.0, [0.0], 64), start.copy()
     still = settle(march, at, 1e-3, 100)
     assert still.settled and still.periods < 20

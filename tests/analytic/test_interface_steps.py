@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from upd.hbm.core.newton import Border, bordered_factors
-from upd.hbm.faces.corrector import KnownFactors, PlaneSteps
-from upd.hbm.faces.newton import InterfaceEvaluation
+from upd.hbm.core.factors import Border, Factors
+from upd.hbm.faces.corrector import PlaneSteps
 
 FloatArray = NDArray[np.float64]
 U = 12
 
 
-def problem(changed: int) -> tuple[FloatArray, FloatArray, FloatArray, KnownFactors]:
+def problem(changed: int) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
     """A matrix (U, U + 1) of linear equations, their right side and a plane; factors of a matrix
     that differs by this rank, with another plane and other units."""
     rng = np.random.default_rng(7)
@@ -24,8 +24,7 @@ def problem(changed: int) -> tuple[FloatArray, FloatArray, FloatArray, KnownFact
     near = J + rng.normal(size=(U, changed)) @ rng.normal(size=(changed, U + 1)) * 0.3
     D = rng.uniform(0.5, 2.0, U)
     border = Border(near[:, -1], D, 1.0, rng.normal(size=U + 1))
-    factors = bordered_factors(near[:, :-1], border)
-    known = KnownFactors(factors, D, cast(InterfaceEvaluation, None))
+    known = SimpleNamespace(factors=Factors(near[:, :-1], border), D=D)
     return J, rng.normal(size=U), rng.normal(size=U + 1), known
 
 

@@ -108,7 +108,7 @@ def test_loops_are_closed_and_obey_coulomb(solution: ForcedSolution, one: Marche
     """
     k_t = solution.models["thesis"].contacts.law.k_t
     loops = loops_of(solution, one, 4)
-    start = one.sweep.answer.starts[one.peak.sample].slip.reshape(2, -1)
+    start = one.sweep.answer.points[one.peak.sample].start.slip.reshape(2, -1)
     assert [loop.point for loop in loops] == list(np.argsort(-one.period.loss))
     for loop in loops:
         d, T = loop.displacement, loop.traction
@@ -131,7 +131,7 @@ def test_the_damper_follows_its_contact_forces(one: Marched) -> None:
     """Its motion ends where the march's own does; the mean of the forces on it is F_C."""
     found = one.sweep.answer
     march = InterfaceMarch(found.model, one.frequency, found.drive, found.samples, by_coulomb)
-    at = found.starts[one.peak.sample].copy()
+    at = found.points[one.peak.sample].start.copy()
     march.period(at)
     period = period_of_sweep(found, one.peak.sample, by_coulomb)
     assert period.motion[-1] == pytest.approx(at.s, rel=1e-12)

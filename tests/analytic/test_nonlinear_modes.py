@@ -17,7 +17,7 @@ from upd.errors import InputError
 from upd.hbm import (
     NonlinearMode,
     Path,
-    Settings,
+    PathProblem,
     contacts,
     frequency_response,
     nonlinear_mode,
@@ -165,9 +165,9 @@ def test_a_path_that_stops_is_taken_up_with_shorter_steps(monkeypatch: pytest.Mo
     amplitudes = X_C * np.geomspace(0.5, 50.0, 9)
     whole, steps, follow = jenkins(amplitudes), [], nonlinear_modes.follow
 
-    def closed(*args: Any, settings: Settings, **options: Any) -> Path:
-        path = follow(*args, settings=settings, **options)
-        steps.append(settings.angle)
+    def closed(problem: PathProblem, *args: Any, **options: Any) -> Path:
+        path = follow(problem, *args, **options)
+        steps.append(problem.settings.angle)
         if len(steps) > 1:
             return path
         # beyond the fifth amplitude, as where it crosses to a closed path

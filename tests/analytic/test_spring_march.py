@@ -153,7 +153,7 @@ def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> N
     at = state_of(springs, model, a, i, curve.force)
     march = InterfaceMarch(springs.march, f, [curve.force], 128, by_coulomb)
     mine = settle(march, at, 1e-3, 700)
-    assert abs(mine.first_harmonic[RIGHT]) == pytest.approx(
+    assert abs(mine.harmonics[0, RIGHT]) == pytest.approx(
         other.amplitude(model.row("right")), rel=2e-3
     )
     assert mine.last.counts[1] < 1.0
@@ -185,7 +185,7 @@ def test_an_explicit_march_of_all_modes_stays_at_the_motion(
     full = explicit.explicit_march(model, 0.005)
     found, _, change = full.steady(f, force, full.at(springs, at, force), most=64)
     assert change < 1e-3
-    assert abs(mine.first_harmonic[RIGHT]) == pytest.approx(abs(found[RIGHT]), rel=2e-3)
+    assert abs(mine.harmonics[0, RIGHT]) == pytest.approx(abs(found[RIGHT]), rel=2e-3)
 
 
 def test_a_sweep_without_slip_is_the_linear_answer(solution: ForcedSolution) -> None:
@@ -198,7 +198,7 @@ def test_a_sweep_without_slip_is_the_linear_answer(solution: ForcedSolution) -> 
     # what a period is marched again from
     assert flat.harmonics.shape == (4, 1, flat.amplitude.shape[1])
     assert flat.harmonics[:, 0] == pytest.approx(flat.amplitude)
-    again = flat.starts[2].copy()
+    again = flat.points[2].start.copy()
     out = InterfaceMarch(flat.model, f[2], flat.drive, flat.samples).period(again).output
     n = flat.samples
     z = 2.0 / n * np.exp(-2j * np.pi * np.arange(1, n + 1) / n) @ out

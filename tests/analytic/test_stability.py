@@ -15,7 +15,7 @@ from upd.errors import InputError
 from upd.hbm import FrequencyResponse, Settings, contacts, frequency_response, harmonics, stability
 from upd.hbm.core.fourier import synthesis
 from upd.hbm.springs.response import GivenSystem
-from upd.hbm.springs.stability import Changes, changes, period_map
+from upd.hbm.springs.stability import changes, period_map
 
 FloatArray = NDArray[np.float64]
 
@@ -52,10 +52,8 @@ def duffing(A: float, w: float) -> tuple[FloatArray, float]:
 def multipliers(A: float, w: float, steps: int = 512) -> tuple[NDArray[np.complex128], float]:
     x, w = duffing(A, w)
     q = synthesis(H, steps) @ x
-    none = np.zeros((steps, 0, 0))
-    slopes = Changes(
-        (3 * k3 * q**2)[:, None, None], none.reshape(steps, 1, 0), none.reshape(steps, 0, 1), none
-    )
+    rest = (np.zeros((steps, *shape)) for shape in ((1, 0), (0, 1), (0, 0)))
+    slopes = ((3 * k3 * q**2)[:, None, None], *rest)
     dt = 2 * np.pi / w / steps
     return np.linalg.eigvals(period_map(np.ones(1), np.array([c]), np.ones((1, 1)), slopes, dt)), w
 

@@ -24,7 +24,7 @@ from upd.hbm import (
     travelling_wave_response,
     wave_in_time,
 )
-from upd.hbm.core.newton import Border
+from upd.hbm.core.factors import Border
 from upd.hbm.springs import jacobian
 from upd.hbm.springs.waves import WaveBalance, spread_to_all
 

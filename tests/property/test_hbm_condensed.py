@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.whole_balance import evaluate
 from upd.hbm import contacts, harmonics
-from upd.hbm.core.newton import Border
+from upd.hbm.core.factors import Border
 from upd.hbm.springs import jacobian
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, STICK

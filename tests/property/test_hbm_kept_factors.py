@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,28 +14,24 @@ from tests.literature.test_hbm_blade_damper_blade import Y2, response
 from tests.property.test_hbm_condensed import MOVES, OPEN, STICKS, problem
 from tests.stability.test_hbm_hard_cases import gap_oscillator
 from tests.whole_balance import Whole, evaluate
-from upd.hbm.core import kept_factors
-from upd.hbm.core.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
-from upd.hbm.core.newton import Border, bordered_factors
+from upd.hbm.core import factors
+from upd.hbm.core.factors import (
+    LEFT,
+    LEFT_OF_TANGENT,
+    Border,
+    Factors,
+    FactorsOf,
+    KeptFactors,
+    Product,
+)
 from upd.hbm.springs import jacobian
 
 
-class Dense(NamedTuple):
-    """A Jacobian as it is."""
-
-    J: np.ndarray
-
-    def factored(self, border: Border):
-        return bordered_factors(self.J, border)
-
-    def product(self, x: np.ndarray) -> np.ndarray:
-        return self.J @ x
-
-
-def parts(A: np.ndarray) -> tuple[Dense, Border]:
-    """A bordered matrix: all unknowns of size one."""
+def parts(A: np.ndarray) -> tuple[Product, FactorsOf, Border]:
+    """A bordered matrix: product, factors, border; all unknowns of size one."""
     n = len(A) - 1
-    return Dense(A[:n, :n]), Border(A[:n, n], np.ones(n), 1.0, A[n])
+    J = A[:n, :n]
+    return partial(np.matmul, J), partial(Factors, J), Border(A[:n, n], np.ones(n), 1.0, A[n])
 
 
 def whole_matrix(whole: Whole, D: np.ndarray, p_scale: float, normal: np.ndarray) -> np.ndarray:
@@ -48,7 +44,7 @@ def whole_matrix(whole: Whole, D: np.ndarray, p_scale: float, normal: np.ndarray
 def always(monkeypatch: pytest.MonkeyPatch) -> None:
     """Factors are kept of small matrices, and solutions are cheap beside them."""
     monkeypatch.setattr(jacobian, "WORTH_KEEPING", 0)
-    monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.01)
+    monkeypatch.setattr(factors, "SOLUTIONS", 0.01)
 
 
 def kept(of: np.ndarray) -> KeptFactors:
@@ -85,8 +81,8 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
     other = x * rng.uniform(0.97, 1.03, b.size)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jacobian, "WORTH_KEEPING", 0)
-        patch.setattr(kept_factors, "SOLUTIONS", 0.01)
-        patch.setattr(kept_factors, "LEFT", LEFT_OF_TANGENT)
+        patch.setattr(factors, "SOLUTIONS", 0.01)
+        patch.setattr(factors, "LEFT", LEFT_OF_TANGENT)
         _, J, slope = b.linearised(x, 1.3)
         assert J is not None
         D, normal = rng.uniform(0.5, 2, b.size), rng.normal(size=b.size + 1)
@@ -148,12 +144,12 @@ def test_a_matrix_too_far_is_factored() -> None:
     of = kept(rng.normal(size=(40, 40)))
     with pytest.MonkeyPatch.context() as patch:
         # ten solutions at most
-        patch.setattr(kept_factors, "SOLUTIONS", 2.0)
+        patch.setattr(factors, "SOLUTIONS", 2.0)
         found = of.near(*parts(M), 40)
         r = rng.normal(size=40)
         np.testing.assert_allclose(found.solve(r[:-1], r[-1]), np.linalg.solve(M, r), rtol=1e-9)
-    J, border = parts(M)
-    own = J.factored(border)
+    _, factored, border = parts(M)
+    own = factored(border)
     assert (found.sign, found.ratio) == (own.sign, own.ratio)
     # and kept for the next one: one product
     of.near(*parts(M), 40).solve(r[:-1], r[-1])
@@ -174,7 +170,7 @@ def test_a_singular_matrix_has_no_finite_correction() -> None:
 def test_factors_are_renewed_when_waiting_costs_more() -> None:
     """Costs of a correction rise by one each time: the best is where the average is least."""
     of, A = KeptFactors(), np.eye(1)
-    dear, costs = 0.5 / kept_factors.SOLUTIONS, list[int]()
+    dear, costs = 0.5 / factors.SOLUTIONS, list[int]()
     of.near(*parts(np.eye(1)), 0)
     of.spent = dear
     first = of.factors
@@ -203,15 +199,15 @@ def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPat
 
     usual = curves()
     used: list[int] = []
-    found = kept_factors.gmres
+    found = factors.gmres
 
     def counted(*args, **options):
         used.append(1)
         return found(*args, **options)
 
-    monkeypatch.setattr(kept_factors, "gmres", counted)
+    monkeypatch.setattr(factors, "gmres", counted)
     monkeypatch.setattr(jacobian, "WORTH_KEEPING", 0)
-    monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.5)
+    monkeypatch.setattr(factors, "SOLUTIONS", 0.5)
     near = curves()
     assert all(one.balance.linear.kept.factors is None for one in near)
     assert len(used) > 500

@@ -8,8 +8,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
-from upd.hbm.core.newton import PathProblem
+from upd.hbm import (
+    Contacts,
+    FrequencyResponse,
+    PathProblem,
+    Settings,
+    contacts,
+    follow,
+    frequency_response,
+)
 from upd.hbm.springs.coulomb import SLIP
 from upd.hbm.springs.points import Start
 from upd.hbm.springs.sweep import from_stuck
@@ -154,24 +161,15 @@ def test_continuation_passes_both_folds_and_restarts() -> None:
     def scale(x: np.ndarray) -> np.ndarray:
         return np.ones_like(x)
 
-    start = PathProblem(circle, scale).solve(np.array([0.9]), -0.5)
-    first = follow(
-        circle,
-        (start.x, -0.5),
-        2.0,
-        scale=scale,
-        p_scale=1.0,
-        settings=Settings(most_points=25, largest_step=0.2),
+    few, more = (
+        PathProblem(circle, scale, settings=Settings(most_points=most, largest_step=0.2))
+        for most in (25, 80)
     )
+    start = few.solve(np.array([0.9]), -0.5)
+    assert start is not None
+    first = follow(few, (start.x, -0.5), 2.0)
     assert first.status == "step limit"
-    rest = follow(
-        circle,
-        first.state,
-        2.0,
-        scale=scale,
-        p_scale=1.0,
-        settings=Settings(most_points=80, largest_step=0.2),
-    )
+    rest = follow(more, first.state, 2.0)
     x, p = np.concatenate([first.x[:, 0], rest.x[:, 0]]), np.concatenate([first.p, rest.p])
     np.testing.assert_allclose(x**2 + p**2, 1.0, atol=1e-9)
     assert x.min() < -0.9

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upd.hbm import Settings, follow
+from upd.hbm import PathProblem, Settings, follow
 from upd.hbm.core.continuation import PROBE
 from upd.hbm.core.newton import Function
 
@@ -36,11 +36,9 @@ def needle(m: float, condition: float) -> Function:
 def test_a_path_that_turns_back_at_a_kink_goes_on_along_the_other_piece(m: float) -> None:
     for begin in np.linspace(-1.0, -0.5, 20):
         path = follow(
-            needle(m, 1e9),
+            PathProblem(needle(m, 1e9), ones),
             (np.array([begin, 0.0, 0.0]), float(begin)),
             2.0,
-            scale=ones,
-            p_scale=1.0,
             turned=float(begin) - 0.2,
         )
         assert path.x[-1, 0] == pytest.approx(path.p[-1] / m)
@@ -57,7 +55,7 @@ def test_a_wanted_value_inside_a_narrow_wiggle_is_not_reached_on_the_way_back() 
         return np.array([p - p_of(x[0]).real]), np.array([[-slope]]), np.array([1.0])
 
     start = np.array([-0.05]), p_of(-0.05).real
-    path = follow(function, start, 2.0, scale=ones, p_scale=1.0, wanted=np.array([1.0]))
+    path = follow(PathProblem(function, ones), start, 2.0, wanted=np.array([1.0]))
     assert path.status == "complete"
     assert abs(path.x[path.p == 1.0] - 0.05).min() > 1e-3, "the middle pass"
 
@@ -73,11 +71,9 @@ def test_a_wanted_value_beyond_a_fold_is_not_sought_behind_the_step(count: int) 
 
     end = k * (27.0 - 9.0 * e)
     path = follow(
-        function,
+        PathProblem(function, ones, end),
         (np.array([-3.0]), -end),
         end,
-        scale=ones,
-        p_scale=end,
         wanted=np.linspace(-end, end, count),
     )
     assert path.status == "complete"
@@ -97,7 +93,7 @@ def test_a_wanted_value_is_not_reached_on_the_pass_before() -> None:
         return np.array([r]), np.array([[-slopes[i]]]), np.array([1.0])
 
     wanted = np.linspace(-1.0, 1.0, 12)
-    path = follow(function, (np.array([-1.0]), -1.0), 1.0, scale=ones, p_scale=1.0, wanted=wanted)
+    path = follow(PathProblem(function, ones), (np.array([-1.0]), -1.0), 1.0, wanted=wanted)
     assert path.status == "complete"
     assert (np.diff(path.x[:, 0]) > -1e-9).all()
 
@@ -112,15 +108,9 @@ def test_a_closed_path_ends_after_one_round(wanted: list[float]) -> None:
     own.
     """
     # steps so short that many points have no wanted value: 100 of 157 a round
-    path = follow(
-        circle,
-        (np.array([0.75**0.5]), -0.5),
-        2.0,
-        scale=ones,
-        p_scale=1.0,
-        wanted=np.array(wanted),
-        settings=Settings(largest_step=0.2 if wanted[0] == 0.0 else 0.04),
-    )
+    settings = Settings(largest_step=0.2 if wanted[0] == 0.0 else 0.04)
+    problem = PathProblem(circle, ones, settings=settings)
+    path = follow(problem, (np.array([0.75**0.5]), -0.5), 2.0, wanted=np.array(wanted))
     assert path.status == "stopped"
     assert "a second time" in path.message
     angle = np.unwrap(np.arctan2(path.p, path.x[:, 0]))

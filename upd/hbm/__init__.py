@@ -15,9 +15,9 @@ Multi-harmonic balance, continuation, time-march cross-check.
 True
 """
 
-from upd.hbm.core.continuation import Path, State, follow
+from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import Harmonics, harmonics
-from upd.hbm.core.newton import Settings
+from upd.hbm.core.newton import PathProblem, Settings, State
 from upd.hbm.springs.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.springs.nonlinear_mode import NonlinearMode, nonlinear_mode
 from upd.hbm.springs.peak import Peak, climb
@@ -40,6 +40,7 @@ __all__ = [
     "Law",
     "NonlinearMode",
     "Path",
+    "PathProblem",
     "Peak",
     "RigidDamper",
     "Settings",

@@ -317,7 +317,7 @@ def stays(
     except ConvergenceError as error:
         log.info("time integration at %.6g Hz: %s", f, one_line(error))
         return None
-    integrated = scale * np.abs(found.first_harmonic[: len(SIDES)])
+    integrated = scale * np.abs(found.harmonics[0, : len(SIDES)])
     H = measures.accelerance_at(model, b, x[None], np.array([f]), force)
     balance = np.array([abs(H[side][0]) for side in SIDES])
     size, near, room = np.linalg.norm(balance), balance, STAYS

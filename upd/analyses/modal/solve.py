@@ -243,7 +243,7 @@ def _response(solution: ModalSolution) -> RigResponse:
     system = modal_system(free, choice.damping, static=static)
     zeta = choice.damping
     if choice.peak is not None:
-        zeta = tune_damping(system, force, [output], choice.peak, band=band).zeta
+        zeta = tune_damping(system, force, [output], choice.peak, band=band)
         system = modal_system(free, zeta, static=static)
     found = frequency_response(system, force, [output], grid)
     curves = {"free": {"right": found.H[:, 0], "left": np.zeros(len(grid), complex)}}

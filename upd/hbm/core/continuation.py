@@ -15,23 +15,20 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
+from upd.hbm.core.factors import EPS, Border
 from upd.hbm.core.newton import (
-    EPS,
     ROUNDING,
-    Border,
     FloatArray,
-    Function,
     PathProblem,
-    Scale,
     Settings,
-    Solution,
+    State,
+    across,
     bordered_factors,
     correct,
-    finite_jacobian,
 )
 from upd.labels import Shown
 
@@ -45,33 +42,6 @@ PROBE = 100
 #: how far the corrector may move from the predicted point, in steps: farther away lies another
 #: piece of the path
 STRAY = 2.0
-
-
-class State(NamedTuple):
-    """Where a path stands: enough to go on.
-
-    Attributes
-    ----------
-    x : (n,) ndarray
-        Unknowns.
-    p : float
-        Parameter.
-    tangent : (n + 1,) ndarray
-        In scaled coordinates.
-    step : float
-        Next step, in scaled arclength.
-    direction : float
-        Direction of p at the start of the path, +1 or -1.
-    sign : float
-        Sign of the determinant of the equations bordered by the tangent.
-    """
-
-    x: FloatArray
-    p: float
-    tangent: FloatArray
-    step: float
-    direction: float
-    sign: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,15 +69,12 @@ class Path(Shown):
 
 
 def follow(
-    function: Function,
+    problem: PathProblem,
     start: State | tuple[FloatArray, float],
     end: float,
     *,
-    scale: Scale,
-    p_scale: float,
     wanted: FloatArray | None = None,
     turned: float | None = None,
-    settings: Settings | None = None,
 ) -> Path:
     """Path from a solved point to a value of the parameter.
 
@@ -117,54 +84,38 @@ def follow(
 
     Parameters
     ----------
-    function : callable
-        (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,).
+    problem : PathProblem
     start : State, or tuple of (n,) ndarray and float
         A solved point (x, p), or the state of an earlier path.
     end : float
         Parameter at which the path is complete.
-    scale : callable
-        x (n,) -> sizes of the unknowns (n,).
-    p_scale : float
-        Size of the parameter.
     wanted : (k,) ndarray, optional
         Parameter values that are hit exactly.
     turned : float, optional
         A value on the other side of the start; a path that comes back as far has reversed its
         direction for good and ends there.
-    settings : Settings, optional
 
     Returns
     -------
     Path
     """
-    s = settings or Settings()
-    problem = PathProblem(function, scale, p_scale, s)
+    most_points, at = problem.settings.most_points, problem.shown
     state = start if isinstance(start, State) else begin(problem, *start, end)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
     rest = latest = 0
     xs, ps = [state.x], [state.p]
     passed: dict[float, list[FloatArray]] = {float(mark): [] for mark in marks}
-    status: Status = "stopped"
-    while len(ps) < s.most_points:
-        if (end - state.p) * state.direction <= 0:
-            status, message = "complete", f"reached p = {end:.9g} in {len(ps)} points"
-            break
+    why = ""
+    while len(ps) < most_points and not why and (end - state.p) * state.direction > 0:
         found = advance(problem, state, marks)
         if found is None:
-            message = (
-                f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine "
-                "the samples or change the start"
-            )
+            why = "no convergence with the smallest step; refine the samples or change the start"
             break
         state = found
         rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
         if rest < len(ps) and np.abs(found.x).max() > UNBOUNDED * np.abs(xs[rest]).max() > 0:
             xs, ps = xs[: rest + 1], ps[: rest + 1]
-            message = (
-                f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs "
-                "damping, or more friction"
-            )
+            why = "the answer grows without bound there; it needs damping, or more friction"
             break
         left = rest == len(ps)
         if found.p in passed:
@@ -175,24 +126,23 @@ def follow(
         xs.append(found.x)
         ps.append(found.p)
         there = passed.get(found.p, [])
-        if left and any(np.abs((found.x - x) / scale(x)).max() <= ROUNDING for x in there):
-            message = (
-                f"stopped at p = {found.p:.9g}: the path came to the same solution a second time; "
-                "it is closed, or runs back on itself"
+        again = (np.abs((found.x - x) / problem.scale(x)).max() <= ROUNDING for x in there)
+        if left and any(again):
+            why = (
+                "the path came to the same solution a second time; it is closed, or runs back on "
+                "itself"
             )
-            break
+        elif turned is not None and (turned - state.p) * state.direction > 0:
+            why = f"the path reversed its direction and came back past {at(turned)}"
         there.append(found.x)
-        if turned is not None and (turned - state.p) * state.direction > 0:
-            message = (
-                f"stopped at p = {state.p:.9g}: the path reversed its direction and came back "
-                f"past {turned:.9g}"
-            )
-            break
-    else:
-        status = "step limit"
-        message = f"{s.most_points} points used before p = {end:.9g}; it is at p = {state.p:.9g}"
-    if status == "stopped":
+    status: Status = "complete"
+    message = f"reached {at(end)} in {len(ps)} points"
+    if why:
+        status, message = "stopped", f"stopped at {at(state.p)}: {why}"
         log.warning(message)
+    elif (end - state.p) * state.direction > 0:
+        status = "step limit"
+        message = f"{most_points} points used before {at(end)}; it is at {at(state.p)}"
     return Path(np.array(xs), np.array(ps), state, status, message)
 
 
@@ -215,10 +165,11 @@ def begin(problem: PathProblem, x: FloatArray, p: float, end: float = np.inf) ->
     """
     _, J, dp = problem.function(x, p, True)
     direction = 1.0 if end >= p else -1.0
-    normal = np.zeros(len(x) + 1)
-    normal[-1] = direction
+    normal = across(x, direction)
     lu = bordered_factors(J, Border(dp, problem.scale(x), problem.p_scale, normal))
-    return State(x, p, lu.tangent(), problem.settings.first_step, direction, lu.sign)
+    tangent, sign = (normal, 0.0) if lu is None else (lu.tangent(), lu.sign)
+    step = problem.settings.first_step
+    return State(x, p, tangent, sign, step=step, direction=direction)
 
 
 def advance(problem: PathProblem, state: State, marks: FloatArray | None = None) -> State | None:
@@ -259,17 +210,17 @@ class _PathStep:
             guess, p = self._along(state.tangent, length)
             normal = state.tangent
             if hit is not None:
-                p, normal = hit, self._across(state.tangent[-1])
+                p, normal = hit, across(state.x, state.tangent[-1])
             found = self._corrected(guess, p, normal, STRAY * length)
-            if hit is not None and length > s.kink_step:
+            if found is not None and hit is not None and length > s.kink_step:
                 way = self._distance(found, state.x, state.p)
                 # a chord turns by less than the tangents at its ends: beyond, it leads to another
                 # pass
                 if self._ahead(found) < np.cos(s.angle) * way:
-                    found = found._replace(tangent=None)
-            if hit is None and found.tangent is not None:
+                    found = None
+            if hit is None and found is not None:
                 found = self._on_mark(found, marks)
-            if found.tangent is not None:
+            if found is not None:
                 cosine = float(np.clip(found.tangent @ state.tangent, -1, 1))
                 angle = float(np.arccos(cosine))
                 straight = angle <= s.angle or length <= s.kink_step
@@ -303,22 +254,23 @@ class _PathStep:
         reach = 4 * s.smallest_step
         while reach <= s.kink_step:
             _, J, dp = self.problem.function(*self._along(state.tangent, reach), True)
-            lu = None
-            if finite_jacobian(J):
-                lu = bordered_factors(J, Border(dp, self.D, self.p_scale, state.tangent))
-            if lu is not None and not lu.singular:
+            lu = bordered_factors(J, Border(dp, self.D, self.p_scale, state.tangent))
+            if lu is not None:
                 tangent = lu.tangent() * (lu.sign * state.sign)
                 if tangent @ state.tangent < np.cos(s.angle):
                     guess, p = self._along(tangent, reach)
                     found = correct(self.problem, guess, p, self.D, tangent)
-                    near = self._distance(found, state.x, state.p) <= STRAY * reach
-                    # a tangent of the other sign runs back on the piece the path came from
-                    if near and found.tangent is not None and found.sign == state.sign:
+                    if (
+                        found is not None
+                        and self._distance(found, state.x, state.p) <= STRAY * reach
+                        # a tangent of the other sign runs back on the piece the path came from
+                        and found.sign == state.sign
+                    ):
                         return self._moved(found, 1.0, reach)
             reach *= 4
         return None
 
-    def _on_mark(self, found: Solution, marks: FloatArray) -> Solution:
+    def _on_mark(self, found: State, marks: FloatArray) -> State | None:
         """The solution at a wanted p that an arclength step went past.
 
         The step's own when none was passed or that one is not found. One that is not between both
@@ -336,46 +288,38 @@ class _PathStep:
             state.x + share * (found.x - state.x),
             self._distance(found, state.x, state.p),
         )
-        there = self._corrected(guess, mark, self._across(found.p - state.p), most)
-        if there.tangent is None:
+        there = self._corrected(guess, mark, across(state.x, found.p - state.p), most)
+        if there is None:
             return found
-        between = 0.0 < self._ahead(there) < self._ahead(found)
-        return there if between else found._replace(tangent=None)
+        return there if 0.0 < self._ahead(there) < self._ahead(found) else None
 
-    def _corrected(self, x: FloatArray, p: float, normal: FloatArray, most: float) -> Solution:
+    def _corrected(self, x: FloatArray, p: float, normal: FloatArray, most: float) -> State | None:
         """The solution in the plane through a point, or none when it strays farther than `most`."""
         found = correct(self.problem, x, p, self.D, normal)
-        return found if self._distance(found, x, p) <= most else found._replace(tangent=None)
+        return found if found is not None and self._distance(found, x, p) <= most else None
 
     def _along(self, direction: FloatArray, length: float) -> tuple[FloatArray, float]:
         """The point at a scaled distance from the state."""
         x = self.state.x + length * direction[:-1] * self.D
         return x, self.state.p + length * float(direction[-1]) * self.p_scale
 
-    def _across(self, rate: float) -> FloatArray:
-        """Across the plane of one parameter value."""
-        normal = np.zeros_like(self.state.tangent)
-        normal[-1] = np.sign(rate)
-        return normal
-
-    def _ahead(self, found: Solution) -> float:
+    def _ahead(self, found: State) -> float:
         """How far a solution is from the state along its tangent, scaled."""
         at = self.state
         way = np.append((found.x - at.x) / self.D, (found.p - at.p) / self.p_scale)
         return float(way @ at.tangent)
 
-    def _distance(self, found: Solution, x: FloatArray, p: float) -> float:
+    def _distance(self, found: State, x: FloatArray, p: float) -> float:
         """Scaled length of the way from a point to a solution."""
         return float(np.hypot(np.linalg.norm((found.x - x) / self.D), (found.p - p) / self.p_scale))
 
-    def _moved(self, found: Solution, side: float, step: float) -> State:
+    def _moved(self, found: State, side: float, step: float) -> State:
         """The state at a solution, with its tangent to one side."""
-        assert found.tangent is not None
         tangent = side * found.tangent
         tangent[:-1] = tangent[:-1] * self.D / self.problem.scale(found.x)
         tangent /= np.linalg.norm(tangent)
-        direction = self.state.direction
-        return State(found.x, found.p, tangent, step, direction, side * found.sign)
+        sign, direction = side * found.sign, self.state.direction
+        return found._replace(tangent=tangent, sign=sign, step=step, direction=direction)
 
     def _to_mark(self, marks: FloatArray, h: float) -> tuple[float, float | None]:
         """Step length cut at the next wanted p, and that p when it lies within the step."""

@@ -10,8 +10,7 @@ when 0 is not in the set):
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,34 +36,30 @@ class Harmonics:
     ----------
     numbers : tuple of int
         Harmonic numbers, ascending.
+    static : bool
+        Whether harmonic 0 is in the set.
+    dynamic : (n_k,) ndarray of int
+        Harmonics above 0.
+    offset : int
+        Column of the first cosine coefficient: 1 with harmonic 0, else 0.
+    size : int
+        Real coefficients per signal.
+    highest : int
+        Highest harmonic number.
     """
 
     numbers: tuple[int, ...]
+    static: bool = field(init=False, compare=False)
+    dynamic: NDArray[np.int64] = field(init=False, compare=False)
+    offset: int = field(init=False, compare=False)
+    size: int = field(init=False, compare=False)
+    highest: int = field(init=False, compare=False)
 
-    @property
-    def static(self) -> bool:
-        """Whether harmonic 0 is in the set."""
-        return self.numbers[0] == 0
-
-    @cached_property
-    def dynamic(self) -> NDArray[np.int64]:
-        """Harmonics above 0, (n_k,)."""
-        return np.array([k for k in self.numbers if k > 0], dtype=np.int64)
-
-    @property
-    def offset(self) -> int:
-        """Column of the first cosine coefficient: 1 with harmonic 0, else 0."""
-        return int(self.static)
-
-    @property
-    def size(self) -> int:
-        """Real coefficients per signal."""
-        return self.offset + 2 * len(self.dynamic)
-
-    @property
-    def highest(self) -> int:
-        """Highest harmonic number."""
-        return self.numbers[-1]
+    def __post_init__(self) -> None:
+        static = self.numbers[0] == 0
+        dynamic, o = np.array(self.numbers[static:], dtype=np.int64), int(static)
+        size, highest = o + 2 * len(dynamic), self.numbers[-1]
+        self.__dict__.update(static=static, dynamic=dynamic, offset=o, size=size, highest=highest)
 
     def place(self, harmonic: int | None = None) -> int:
         """Place of a harmonic in `dynamic`.

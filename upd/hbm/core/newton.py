@@ -4,82 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+
+from upd.hbm.core.factors import EPS, Border, BorderedFactors, Factors, FactorsOf
 
 FloatArray = NDArray[np.float64]
 
 
-class BorderedFactors(Protocol):
-    """What solves with [[J, r_p], [normal]] in scaled unknowns."""
-
-    @property
-    def singular(self) -> bool:
-        """Whether a pivot is zero."""
-
-    @property
-    def sign(self) -> float:
-        """Sign of the determinant, up to a factor that never changes on a path."""
-
-    @property
-    def ratio(self) -> float:
-        """Smallest over largest pivot."""
-
-    def solve(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-
-    def tangent(self) -> FloatArray:
-        """Unit vector along the path, on the side the border points to."""
-
-
-class StructuredJacobian(Protocol):
-    """A Jacobian J that knows its structure, where a matrix (n, n) would be large."""
-
-    @property
-    def finite(self) -> bool:
-        """Whether all its entries are."""
-
-    def bordered(self, border: Border) -> BorderedFactors:
-        """Factors of [[J, r_p], [normal]]."""
-
-
-class Border(NamedTuple):
-    """What makes a Jacobian J the matrix [[J, r_p], [normal]] of a plane, in scaled unknowns.
-
-    Attributes
-    ----------
-    dp : (n,) ndarray
-        Derivative of the residual by the parameter.
-    D : (n,) ndarray
-        Sizes of the unknowns.
-    p_scale : float
-        Size of the parameter.
-    normal : (n + 1,) ndarray
-        Across the plane, in scaled coordinates.
-    """
-
-    dp: FloatArray
-    D: FloatArray
-    p_scale: float
-    normal: FloatArray
-
-    @property
-    def sizes(self) -> FloatArray:
-        """Sizes of the unknowns, that of the parameter last (n + 1,)."""
-        return np.append(self.D, self.p_scale)
-
-
-#: (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,)
-Function = Callable[
-    [FloatArray, float, bool], tuple[FloatArray, FloatArray | StructuredJacobian | None, FloatArray]
-]
+#: a finite matrix (n, n), or what gives the factors of one that would be large, with a border
+Jacobian = FloatArray | FactorsOf
+#: (x, p, with Jacobian) -> residual (n,), Jacobian or None, derivative by p (n,)
+Function = Callable[[FloatArray, float, bool], tuple[FloatArray, Jacobian | None, FloatArray]]
 
 Scale = Callable[[FloatArray], FloatArray]
-
-EPS = float(np.finfo(float).eps)
 
 #: worst rounding level at which a point still counts as solved, relative to the solution
 ROUNDING = 1e-7
@@ -132,8 +72,8 @@ class Settings:
     most_points: int = 5000
 
 
-class Solution(NamedTuple):
-    """Answer of a corrector.
+class State(NamedTuple):
+    """Where a path stands: enough to go on.
 
     Attributes
     ----------
@@ -141,19 +81,25 @@ class Solution(NamedTuple):
         Unknowns.
     p : float
         Parameter.
-    tangent : (n + 1,) ndarray or None
-        Scaled tangent, None when the corrector failed.
-    iterations : int
-        Newton iterations.
+    tangent : (n + 1,) ndarray
+        In scaled coordinates.
     sign : float
-        Sign of the bordered determinant.
+        Sign of the determinant of the equations bordered by the tangent.
+    iterations : int
+        Newton iterations of the corrector.
+    step : float
+        Next step, in scaled arclength.
+    direction : float
+        Direction of p at the start of the path, +1 or -1.
     """
 
     x: FloatArray
     p: float
-    tangent: FloatArray | None
-    iterations: int
-    sign: float = 0.0
+    tangent: FloatArray
+    sign: float
+    iterations: int = 0
+    step: float = 0.0
+    direction: float = 1.0
 
 
 class PathProblem(NamedTuple):
@@ -168,116 +114,50 @@ class PathProblem(NamedTuple):
     p_scale : float
         Size of the parameter.
     settings : Settings
+    shown : callable
+        Value of the parameter -> its name, value and unit for messages.
     """
 
     function: Function
     scale: Scale
     p_scale: float = 1.0
     settings: Settings = Settings()
+    shown: Callable[[float], str] = "p = {:.9g}".format
 
-    def solve(self, x: FloatArray, p: float) -> Solution:
+    def solve(self, x: FloatArray, p: float) -> State | None:
         """Newton at a fixed parameter from a guess."""
-        normal = np.zeros(len(x) + 1)
-        normal[-1] = 1.0
-        return correct(self, x, p, self.scale(x), normal)
+        return correct(self, x, p, self.scale(x), across(x, 1.0))
 
 
-def finite_jacobian(J: FloatArray | StructuredJacobian | None) -> bool:
-    """Whether there is a Jacobian, all of whose entries are finite.
-
-    Parameters
-    ----------
-    J : (n, n) ndarray, StructuredJacobian or None
-
-    Returns
-    -------
-    bool
-    """
-    if J is None:
-        return False
-    return bool(np.isfinite(J).all()) if isinstance(J, np.ndarray) else J.finite
+def across(x: FloatArray, rate: float) -> FloatArray:
+    """Normal (n + 1,) of the plane of one parameter, on the side of the sign of `rate`."""
+    normal = np.zeros(len(x) + 1)
+    normal[-1] = np.sign(rate)
+    return normal
 
 
-def bordered_factors(J: FloatArray | StructuredJacobian | None, border: Border) -> BorderedFactors:
+def bordered_factors(J: Jacobian | None, border: Border) -> BorderedFactors | None:
     """LU of [[J, r_p], [normal]] in scaled unknowns and equations.
 
     Parameters
     ----------
-    J : (n, n) ndarray or StructuredJacobian
+    J : (n, n) ndarray or callable
     border : Border
 
     Returns
     -------
-    BorderedFactors
+    BorderedFactors or None
+        None without a finite Jacobian, and where the matrix is singular.
     """
-    assert J is not None
-    return Factors(J, border) if isinstance(J, np.ndarray) else J.bordered(border)
-
-
-class Factors:
-    """LU of [[J, r_p], [normal]] of a matrix J (n, n), equations divided by their largest entries.
-
-    Attributes
-    ----------
-    singular : bool
-        Whether a pivot is zero.
-    sign : float
-        Sign of the determinant, up to a factor that never changes on a path.
-    ratio : float
-        Smallest over largest pivot.
-    """
-
-    singular: bool
-    sign: float
-    ratio: float
-    D: FloatArray
-
-    def __init__(self, J: FloatArray, border: Border) -> None:
-        n, self.D = len(J), border.D
-        A = np.empty((n + 1, n + 1), order="F")
-        np.multiply(J, border.D, out=A[:n, :n])
-        A[:n, n] = border.dp * border.p_scale
-        rows = np.abs(A[:n]).max(axis=1)
-        rows[rows == 0] = 1.0
-        A[:n] /= rows[:, None]
-        A[n] = border.normal
-        self._factorise(A, rows)
-
-    def _factorise(self, A: FloatArray, rows: FloatArray) -> None:
-        """Parameters: the matrix, overwritten, and what its equations were divided by."""
-        self.rows = rows
-        self.lu, self.piv, info = lapack.dgetrf(A, overwrite_a=True)
-        diagonal = np.diagonal(self.lu)
-        size = np.abs(diagonal)
-        self.singular = info != 0 or not np.isfinite(size).all()
-        if self.singular:
-            self.sign, self.ratio = 0.0, EPS
-            return
-        swaps = int(np.count_nonzero(self.piv != np.arange(len(size))))
-        negative = int(np.count_nonzero(diagonal < 0.0))
-        self.sign = 1.0 if (swaps + negative) % 2 == 0 else -1.0
-        self.ratio = max(float(size.min() / size.max()), EPS)
-
-    def _condensed(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled unknowns of the factored equations."""
-        right = np.empty(len(self.rows) + 1)
-        np.divide(r, self.rows, out=right[:-1])
-        right[-1] = last
-        return np.asarray(lapack.dgetrs(self.lu, self.piv, right, overwrite_b=True)[0])
-
-    def solve(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        return self._condensed(r, last)
-
-    def tangent(self) -> FloatArray:
-        """Unit vector along the path, on the side the border points to."""
-        t = self.solve(np.zeros(len(self.D)), 1.0)
-        return np.asarray(t / np.linalg.norm(t))
+    if J is None or (isinstance(J, np.ndarray) and not np.isfinite(J).all()):
+        return None
+    lu = Factors(J, border) if isinstance(J, np.ndarray) else J(border)
+    return None if lu.singular else lu
 
 
 def correct(
     problem: PathProblem, guess: FloatArray, p_guess: float, D: FloatArray, normal: FloatArray
-) -> Solution:
+) -> State | None:
     """Newton in the plane through the guess, damped so that the next correction shrinks.
 
     Natural monotonicity: the test needs no scaling of the equations, only the factors at hand,
@@ -295,21 +175,19 @@ def correct(
 
     Returns
     -------
-    Solution
-        Its tangent is None when not found.
+    State or None
+        None when not found.
 
     References
     ----------
     P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
     """
-    function, _, p_scale, s = problem
+    function, p_scale, s = problem.function, problem.p_scale, problem.settings
     x, p = guess.copy(), p_guess
     for count in range(1, s.iterations + 1):
         r, J, dp = function(x, p, True)
-        if not finite_jacobian(J):
-            break
         lu = bordered_factors(J, Border(dp, D, p_scale, normal))
-        if lu.singular:
+        if lu is None:
             break
         correction, factor = lu.solve(-r, 0.0), 1.0
         if not np.all(np.isfinite(correction)):
@@ -323,7 +201,7 @@ def correct(
             rest = lu.solve(-r, 0.0)
             if _solved(rest, correction, lu.ratio, s):
                 x, p = x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale
-                return Solution(x, p, lu.tangent(), count + 1, lu.sign)
+                return State(x, p, lu.tangent(), lu.sign, count + 1)
             shrinks = float(np.linalg.norm(rest)) / float(np.linalg.norm(correction))
             if factor == 1 and shrinks <= CHORD:
                 x, p, correction = x_new, p_new, rest
@@ -332,9 +210,9 @@ def correct(
             else:
                 factor /= 2
         else:
-            return Solution(x, p, None, count)
+            break
         x, p = x_new, p_new
-    return Solution(x, p, None, s.iterations)
+    return None
 
 
 def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:

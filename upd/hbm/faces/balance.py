@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.core.newton import Settings
+from upd.hbm.core.newton import Settings, across
 from upd.hbm.faces.corrector import InterfaceCorrector, InterfacePlace
 from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
 from upd.hbm.faces.march import Fallback, InterfaceMarch
@@ -128,7 +128,6 @@ def interface_response(
     samples: int = 128,
     settings: Settings | None = None,
     fallback: Fallback | None = None,
-    workers: int | None = None,
 ) -> InterfaceResponse:
     """Follow the curve from the first to the last frequency, through all of them.
 
@@ -153,8 +152,6 @@ def interface_response(
         Step control of the continuation.
     fallback : callable, optional
         As for `upd.hbm.faces.march.InterfaceMarch`.
-    workers : int, optional
-        Threads; by default all that libraries may use. The answer is the same with any number.
 
     Returns
     -------
@@ -176,7 +173,7 @@ def interface_response(
             "in Hz"
         )
     s = settings or replace(Settings(), tolerance=TOLERANCE, smallest_step=SHORTEST)
-    with SideBySide(threads_used() if workers is None else workers) as beside:
+    with SideBySide(threads_used()) as beside:
         equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
         equations.beside = beside
         curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))
@@ -251,17 +248,21 @@ def read_point(e: InterfaceEquations, period: ContactPeriod, frequency: float) -
     -------
     InterfacePoint
     """
-    nodes = np.array([(period.state == code).mean(axis=0) for code in (OPEN, STICK, SLIP)]).T
-    loss = _rubbed(e, period)
+    model, nodes = e.model, [(period.state == code).mean(axis=0) for code in (OPEN, STICK, SLIP)]
+    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
+    lost = (mean * period.relative).sum(axis=0).reshape(3, -1)[1:].sum(axis=0)
+    loss = np.asarray(model.copies * lost)
+    seen = period.q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
+    seen = seen + e.drive @ model.seen_drive.T
     return InterfacePoint(
         frequency,
         period.q,
         period.rigid_before,
         period.slip_before,
-        _outputs(e, period),
-        nodes.mean(axis=0),
+        np.concatenate([seen[:1], seen[1::2] - 1j * seen[2::2]]),
+        np.mean(nodes, axis=1),
         np.append(_energy(e, period), loss.sum()),
-        nodes,
+        np.array(nodes).T,
         loss,
         _unresolved(e, period),
     )
@@ -277,24 +278,6 @@ def _unresolved(e: InterfaceEquations, period: ContactPeriod) -> float:
     if moved == 0.0:
         return 0.0
     return float(np.linalg.norm(model.shapes @ (modal / resistance).T)) / moved
-
-
-def _rubbed(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
-    """Lost by friction at each node, of the whole [N mm]."""
-    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
-    lost = (mean * period.relative).sum(axis=0).reshape(3, -1)[1:].sum(axis=0)
-    return np.asarray(e.model.copies * lost)
-
-
-def _outputs(e: InterfaceEquations, period: ContactPeriod) -> ComplexArray:
-    """(H + 1, K) harmonics of the outputs."""
-    model = e.model
-    real = period.q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
-    real = real + e.drive @ model.seen_drive.T
-    out = np.zeros((e.highest + 1, real.shape[1]), complex)
-    out[0] = real[0]
-    out[1:] = real[1::2] - 1j * real[2::2]
-    return out
 
 
 def _energy(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
@@ -444,9 +427,8 @@ class InterfaceCurve:
 
     def _at_frequency(self, x: FloatArray, f: float) -> InterfacePlace | None:
         """Newton's method at a frequency."""
-        return self.corrector.correct(
-            x, f, self.corrector.across(1.0, x), self.corrector.scale(x), self.equations.split(x)[2]
-        )
+        D, past = self.corrector.scale(x), self.equations.split(x)[2]
+        return self.corrector.correct(x, f, across(x, 1.0), D, past)
 
     def _entered(self, at: InterfacePlace, way: float) -> InterfacePlace:
         """A place kept, with its tangent in the direction of travel, and the first step."""
@@ -470,7 +452,7 @@ class InterfaceCurve:
             mark = float(ahead[np.abs(ahead - at.p).argmin()]) if len(ahead) else np.inf
             hit = abs(mark - at.p) <= h * abs(rate)
             if hit:
-                length, normal = (mark - at.p) / rate, self.corrector.across(rate, at.x)
+                length, normal = (mark - at.p) / rate, across(at.x, rate)
             x = at.x + length * at.tangent[:-1] * D
             p = mark if hit else at.p + length * rate
             found = self.corrector.correct(x, p, normal, D, past, at.known)
@@ -483,7 +465,7 @@ class InterfaceCurve:
                 if stray <= STRAY and not hit and (found.p - mark) * rate > 0.0:
                     # the corrector has passed a frequency that is asked for
                     x = at.x + (mark - at.p) / (found.p - at.p) * (found.x - at.x)
-                    normal = self.corrector.across(rate, at.x)
+                    normal = across(at.x, rate)
                     found = self.corrector.correct(x, mark, normal, D, past, found.known)
                     at = self.corrector.widened(at)
                 if found is not None and stray <= STRAY:
@@ -517,7 +499,6 @@ class InterfaceCurve:
             while load < 1.0:
                 trial = min(load + step, 1.0)
                 e.drive = trial * whole
-                e.forget()
                 found = self._at_frequency(e.joined(q, rigid, slip), f)
                 if found is None:
                     step = 0.5 * (trial - load)
@@ -528,5 +509,4 @@ class InterfaceCurve:
                 step *= 2.0 if found.iterations <= self.settings.wanted_iterations else 1.0
         finally:
             e.drive = whole
-            e.forget()
         return found

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import ConvergenceError
-from upd.hbm.core.kept_factors import KeptFactors
-from upd.hbm.core.newton import Border, BorderedFactors, Settings
-from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
+from upd.hbm.core.factors import Border, KeptFactors
+from upd.hbm.core.newton import Settings
+from upd.hbm.faces.equations import InterfaceEquations
 from upd.hbm.faces.newton import InterfaceEvaluation, slips_for_good
 from upd.hbm.faces.state import FloatArray
 from upd.hbm.faces.step import SOLVED
@@ -18,28 +19,6 @@ from upd.hbm.faces.step import SOLVED
 #: share of the step before that a step by updated factors may have. A derivative costs about four
 #: residuals and its step leaves some hundredths, the fifth root of which this is; it weighs costs
 SHRINKS = 0.5
-
-
-@dataclass(frozen=True)
-class KnownFactors:
-    """Factors of the bordered derivative at a point.
-
-    Attributes
-    ----------
-    factors : BorderedFactors
-    D : (u,) ndarray
-        Units of the unknowns in which they are scaled.
-    of : InterfaceEvaluation
-        The point.
-    """
-
-    factors: BorderedFactors
-    D: FloatArray
-    of: InterfaceEvaluation
-
-    def suits(self, found: InterfaceEvaluation) -> bool:
-        """Whether the equations of another point have the same unknowns and the same form."""
-        return len(self.D) == len(found.x) and np.array_equal(found.good, self.of.good)
 
 
 class PlaneSteps:
@@ -55,9 +34,9 @@ class PlaneSteps:
 
     Parameters
     ----------
-    known : KnownFactors
-        The border of their matrix may be another plane's where they learn: a share of its tangent
-        leads into the plane.
+    known : InterfaceEvaluation
+        With its factors. Their border may be another plane's where they learn: a share of its
+        tangent leads into the plane.
     normal : (u + 1,) ndarray
         Across the plane, a unit vector in units of D.
     D : (u,) ndarray
@@ -67,7 +46,7 @@ class PlaneSteps:
     """
 
     def __init__(
-        self, known: KnownFactors, normal: FloatArray, D: FloatArray, learns: bool
+        self, known: InterfaceEvaluation, normal: FloatArray, D: FloatArray, learns: bool
     ) -> None:
         self.known, self.normal, self.learns = known, normal, learns
         self.steps: list[FloatArray] = []
@@ -76,6 +55,15 @@ class PlaneSteps:
             self.units = np.append(known.D / D, 1.0)
             along = self.units * known.factors.solve(np.zeros(len(D)), 1.0)
             self.along = along / float(normal @ along)
+
+    def updated(self, found: InterfaceEvaluation, last: float) -> FloatArray | None:
+        """The step that was learned, at a point with the same unknowns and the same form of the
+        equations; None where it is not much shorter than the last one.
+        """
+        alike = len(self.known.D) == len(found.x) and np.array_equal(found.good, self.known.good)
+        step = self.next(found.residual) if self.learns and alike else None
+        shrinks = step is not None and float(np.linalg.norm(step)) <= SHRINKS * last
+        return step if shrinks else None
 
     def next(self, residual: FloatArray) -> FloatArray:
         """The step from the residual where the last one led to.
@@ -131,8 +119,8 @@ class InterfacePlace:
         The next one.
     iterations : int
         Derivatives formed.
-    known : KnownFactors
-        Of the derivative there.
+    known : InterfaceEvaluation
+        With the factors there.
     mobile : (n,) ndarray of bool
         Nodes whose slips are among the unknowns.
     """
@@ -142,7 +130,7 @@ class InterfacePlace:
     tangent: FloatArray
     step: float
     iterations: int
-    known: KnownFactors
+    known: InterfaceEvaluation
     mobile: NDArray[np.bool_]
 
 
@@ -168,7 +156,7 @@ class InterfaceCorrector:
         normal: FloatArray,
         D: FloatArray,
         past: FloatArray,
-        known: KnownFactors | None = None,
+        known: InterfaceEvaluation | None = None,
     ) -> InterfacePlace | None:
         """Newton's method in the plane across `normal` through a point; None where it fails.
 
@@ -189,12 +177,11 @@ class InterfaceCorrector:
             Units of the unknowns.
         past : (2 n,) ndarray
             Slips at the point before.
-        known : KnownFactors, optional
-            Of a point near by, from which shorter steps can be taken where this one fails.
+        known : InterfaceEvaluation, optional
+            A point near by with its factors, from which shorter steps can be taken where this one
+            fails.
         """
         e, s = self.equations, self.settings
-        first = len(x) - len(e.tangents)
-        before = past[e.tangents - e.model.n].reshape(2, -1)
         count, sizes, near = 0, [np.inf, np.inf], known is not None
         steps: PlaneSteps | None = None
         if known is not None and len(known.D) == len(D) < MANY:
@@ -207,16 +194,11 @@ class InterfaceCorrector:
             if (period.moving & ~e.mobile).any():
                 # slips of more nodes are unknowns from now on
                 x, D, normal = self._with_more(period.moving, x, D, normal)
-                before = past[e.tangents - e.model.n].reshape(2, -1)
                 steps = None
                 continue
             found = InterfaceEvaluation(e, x, period, past)
-            step = None
-            if steps is not None and steps.learns and steps.known.suits(found):
-                step = steps.next(found.residual)
-                if not float(np.linalg.norm(step)) <= SHRINKS * sizes[-1]:
-                    step = None
-            if step is None:
+            step = None if steps is None else steps.updated(found, sizes[-1])
+            if steps is None or step is None:
                 if count == 0:
                     sizes = [np.inf, np.inf]
                 known = self.factors_at(found, normal, D)
@@ -232,22 +214,20 @@ class InterfaceCorrector:
             sizes.append(float(np.linalg.norm(step)))
             # nodes that change their states to and fro: a shorter step separates them
             wavers = all(sizes[k] > WAVERS * sizes[k - 1] for k in (-1, -2))
-            assert steps is not None
             # Newton's own that grow near a known point: there is a shorter step to be taken
             grows = near and not steps.learns and not sizes[-1] < sizes[-2]
             if wavers or grows or not sizes[-1] < sizes[-3]:
                 return None
-            slip = x[first:].reshape(2, -1)
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
-            if self._stay(x[first:].reshape(2, -1), slip, before, found.period):
+            if self._stay(x, found, past):
                 # the step taken is not the one that was asked for
                 steps = PlaneSteps(steps.known, normal, D, len(D) < MANY)
             if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
                 # the way on is that of the answer, not of the point whose factors led to it
-                here = steps.known if steps.known.of is found else self.factors_at(found, normal, D)
-                if here is None:
+                if steps.known is not found and self.factors_at(found, normal, D) is None:
                     return None
-                return InterfacePlace(x, p, here.factors.tangent(), 0.0, count + 1, here, e.mobile)
+                tangent = found.factors.tangent()
+                return InterfacePlace(x, p, tangent, 0.0, count + 1, found, e.mobile)
 
     def widened(self, at: InterfacePlace) -> InterfacePlace:
         """The same place with the unknowns that there are now."""
@@ -255,12 +235,6 @@ class InterfaceCorrector:
         places = e.places_of(at.mobile)
         tangent = np.append(e.widened(at.tangent[:-1], places, 0.0), at.tangent[-1])
         return replace(at, x=e.widened(at.x, places), tangent=tangent, mobile=e.mobile)
-
-    def across(self, rate: float, x: FloatArray) -> FloatArray:
-        """Across the plane of one frequency, in the direction of travel, (u + 1,)."""
-        normal = np.zeros(len(x) + 1)
-        normal[-1] = np.sign(rate)
-        return normal
 
     def scale(self, x: FloatArray) -> FloatArray:
         """Sizes of the unknowns.
@@ -311,34 +285,41 @@ class InterfaceCorrector:
 
     def factors_at(
         self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray
-    ) -> KnownFactors | None:
-        """Of the derivative at a point; None where it has none, or is singular."""
+    ) -> InterfaceEvaluation | None:
+        """A point with factors of its derivative; None where it has none, or is singular."""
         if not found.linear.fine:
             return None
         many = len(D) >= MANY
-        by_w = found.in_direction(np.zeros(len(D)), 1.0) if many else found.by_w
+        by_w = found.in_direction(np.zeros(len(D)), 1.0) if many else found.derivative[:, -1]
         border = Border(2.0 * np.pi * by_w, D, self.p_scale, normal)
-        factors = self.kept.near(found, border, len(D)) if many else found.factored(border)
-        return None if factors.singular else KnownFactors(factors, D, found)
+        found.D = D
+        if many:
+            product = partial(found.in_direction, dw=0.0)
+            found.factors = self.kept.near(product, found.factored, border, len(D))
+        else:
+            found.factors = found.factored(border)
+        return None if found.factors.singular else found
 
-    def _stay(
-        self, moved: FloatArray, slip: FloatArray, before: FloatArray, period: ContactPeriod
-    ) -> bool:
+    def _stay(self, x: FloatArray, found: InterfaceEvaluation, past: FloatArray) -> bool:
         """Put back nodes that slip for good and are sent back beyond the place of their past.
 
         Parameters
         ----------
-        moved, slip, before : (2, c) ndarray
-            Slips of the nodes that may move: now, overwritten; in the period; in the past.
-        period : ContactPeriod
+        x : (u,) ndarray
+            Unknowns after a step; overwritten.
+        found : InterfaceEvaluation
+            The point before it.
+        past : (2 n,) ndarray
+            Slips at the point before on the curve.
 
         Returns
         -------
         bool
             Whether there are such.
         """
-        e = self.equations
-        after = period.slip[e.tangents - e.model.n].reshape(2, -1)
+        e, period, mine = self.equations, found.period, self.equations.tangents - found.e.model.n
+        moved, slip = (values[e.others :].reshape(2, -1) for values in (x, found.x))
+        before, after = (slips[mine].reshape(2, -1) for slips in (past, period.slip))
         way = np.where(slip != before, slip, after) - before
         moving = period.moving[e.mobile]
         for_good = slips_for_good(e, period)[:, e.mobile].any(axis=0) | ~moving

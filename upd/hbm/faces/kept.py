@@ -77,7 +77,7 @@ def kept_inverses(samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @joined
 def solve_sample(  # type: ignore[no-untyped-def]
-    sample, x0, bases, one, law, node, before, known, past, scratch
+    sample, x0, bases, one, law, nodes, past, scratch
 ):
     """One step of contact, from whatever is near and leads to an answer.
 
@@ -85,22 +85,20 @@ def solve_sample(  # type: ignore[no-untyped-def]
     ----------
     sample : int
         Of the period.
-    x0, bases, one, law, node, scratch
+    x0, bases, one, law, scratch
         As in `upd.hbm.faces.step.contact_step`.
-    before : tuple of ndarray
-        As `node`, of the step before.
-    known : bool
-        Whether the past holds a period.
-    past : tuple of ndarray
-        Forces and relative motions (N, 3 n) and states (N, n) of the samples a period ago, and
-        `kept_inverses` of them.
+    nodes : tuple
+        `node` as there, and the same of the step before.
+    past : tuple
+        Whether it holds a period; forces and relative motions (N, 3 n) and states (N, n) of the
+        samples a period ago, and `kept_inverses` of them.
 
     Returns
     -------
     int
         Newton steps, or inverses formed; -1 without an answer.
     """
-    forces, moves, states, kept, inverses = past
+    (node, before), (known, forces, moves, states, kept, inverses) = nodes, past
     used = -1
     # from the sample a period ago, from the step before, from nothing
     for start in range(0 if known else 1, 3):
@@ -355,7 +353,7 @@ def _entry(w, i, other, Tt, base, one):  # type: ignore[no-untyped-def]
 
 @compiled
 def given_blades(  # type: ignore[no-untyped-def]
-    first, given, known, pushes, step, law, load, s, c, past, x0
+    first, given, pushes, step, law, past, at
 ):
     """Solve samples from `first` on.
 
@@ -365,39 +363,33 @@ def given_blades(  # type: ignore[no-untyped-def]
         Sample to begin with.
     given : bool
         Whether that one was solved elsewhere: its rows of the past hold the answer.
-    known : bool
-        Whether the past holds a guess of every sample; else each starts from the one before, and
-        the first from its own row.
     pushes : (N, 3 n) ndarray
         W (-Phi q - E F) [N].
     step : tuple of ndarray
-        (W B)' (r, 3 n) [N/mm], inverse W (3 n, 3 n) of A [N/mm], B (3 n, r), and the square of the
-        step over the damper's masses J (r, r).
+        (W B)' (r, 3 n) [N/mm], inverse W (3 n, 3 n) of A [N/mm], B (3 n, r), the square of the
+        step over the damper's masses J (r, r), and its static load (r,).
     law : tuple of three (n,) ndarray
         Friction, weights of displacements against forces [N/mm].
-    load : (r,) ndarray
-        Static load.
-    s : (3, r) ndarray
-        Damper's motion, velocity and acceleration in steps; overwritten.
-    c : (3 n,) ndarray
-        -W w_ref of the first sample; overwritten.
-    past : tuple of ndarray
-        Forces [N], minus gaps and slips of the step [mm] (N, 3 n), states (N, n), and
-        `upd.hbm.faces.kept.kept_inverses`; overwritten.
-    x0 : (3 n,) ndarray
-        Overwritten.
+    past : tuple
+        Whether it holds a guess of every sample, else each starts from the one before, and the
+        first from its own row; forces [N], minus gaps and slips of the step [mm] (N, 3 n), states
+        (N, n), and `upd.hbm.faces.kept.kept_inverses`; overwritten.
+    at : tuple of ndarray
+        Overwritten: the damper's motion, velocity and acceleration in steps (3, r), -W w_ref of the
+        first sample (3 n,), and x0 (3 n,).
 
     Returns
     -------
     int
         Samples solved: N, or the sample without an answer; x0 then holds its forces if all stuck.
     """
-    rigid, W, columns, J = step
-    F, Y, S, _, _ = past
+    (rigid, W, columns, J, load), (s, c, x0) = step, at
+    _, F, Y, S, _, _ = past
     N, n, r = len(pushes), len(law[0]), len(load)
     bases, scratch = (np.zeros((1, n), np.bool_), W.reshape(1, 3 * n, 3 * n)), contact_scratch(n)
     f, y, state = np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64)
-    node, before = (f, y, state), (np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64))
+    before = (np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64))
+    nodes = ((f, y, state), before)
     z, b, pull = np.empty(r), np.empty(r), np.empty(r)
     for j in range(first, N):
         for i in range(r):
@@ -418,7 +410,7 @@ def given_blades(  # type: ignore[no-untyped-def]
             fetch_row(Y, max(j - 1, 0), before[1])
             fetch_row(S, max(j - 1, 0), before[2])
             # a bare 0 is a type of its own: all that takes it would be compiled once more
-            used = solve_sample(j, x0, bases, np.int64(0), law, node, before, known, past, scratch)
+            used = solve_sample(j, x0, bases, np.int64(0), law, nodes, past, scratch)
             if used < 0:
                 return j
             put_row(f, F, j)

@@ -336,11 +336,11 @@ class InterfaceMarch:
         """
         N, n, past = self.samples, self.model.n, self.past
         out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(4)
-        parts, motion, known = tuple(self.steps), at.arrays(), self.known
+        parts, motion, filled = tuple(self.steps), at.arrays(), (self.x0, out, sums)
         done, given, fallbacks = 0, False, 0
         while done < N:
-            held = tuple(self.bases), self.which, motion, known, tuple(past)
-            done = march_steps(done, N, given, parts, *held, self.x0, out, sums)
+            held = tuple(self.bases), self.which, motion, (self.known, *past)
+            done = march_steps(done, given, parts, *held, filled)
             given = done < N
             if given:
                 self.finish_step(done, at)

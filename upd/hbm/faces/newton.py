@@ -24,7 +24,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.core.newton import Border, BorderedFactors, Factors
+from upd.hbm.core.factors import Border, BorderedFactors, Factors
 from upd.hbm.faces.equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.faces.jacobian import VERGE, factor_period, invert_period, march_directions
 from upd.hbm.faces.state import FloatArray
@@ -126,11 +126,16 @@ class PeriodDerivative:
         rigid, slips : ndarray
             Changes of the same after the period.
         """
-        if len(faster) > FEW and self.fine and not self.inverted:
-            self._invert()
+        e, (h, m, C), N = self.e, q.shape, len(self.state)
+        if C > FEW and self.fine and not self.inverted:
+            at, square, *_, factors, pivots = self.rows
+            jobs = [
+                partial(invert_period, a, min(a + SAMPLES, N), at, square, factors, pivots)
+                for a in range(0, N, SAMPLES)
+            ]
+            self.inverted, self.fine = True, all(e.beside.run(jobs))
         if not self.fine:
             return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
-        e, (h, m, C), N = self.e, q.shape, len(self.state)
         step = (self.step.W, self.Z, self.M, self.step.J, self.late)
         # an even number of equal pieces, whatever the threads
         wide = C if C <= FEW else -(-C // (2 * -(-C // (2 * DIRECTIONS))))
@@ -147,16 +152,6 @@ class PeriodDerivative:
         found = e.beside.run([partial(some, slice(a, a + wide)) for a in range(0, C, wide)])
         modal, after, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
         return modal, after, slid
-
-    def _invert(self) -> None:
-        """Overwrite the factors by inverses."""
-        at, square, *_, factors, pivots = self.rows
-        N = len(self.state)
-        jobs = [
-            partial(invert_period, first, min(first + SAMPLES, N), at, square, factors, pivots)
-            for first in range(0, N, SAMPLES)
-        ]
-        self.inverted, self.fine = True, all(self.e.beside.run(jobs))
 
 
 def _remembered(
@@ -195,7 +190,14 @@ class InterfaceEvaluation:
     residual : (u,) ndarray
     period : ContactPeriod
         What they come from.
+    factors : BorderedFactors
+        Of the derivative with a border, where `upd.hbm.faces.corrector` has asked for them.
+    D : (u,) ndarray
+        Units of the unknowns in which they are scaled.
     """
+
+    factors: BorderedFactors
+    D: FloatArray
 
     def __init__(
         self,
@@ -252,13 +254,9 @@ class InterfaceEvaluation:
         formed[:, own] = self._with_blades(out, dx, dw)
         return formed
 
-    def product(self, x: FloatArray) -> FloatArray:
-        """Derivative in a direction of the unknowns (u,), without the others."""
-        return self.in_direction(x, 0.0)
-
     def factored(self, border: Border) -> BorderedFactors:
         """Factors of the derivative with a border."""
-        return Factors(self.jacobian, border)
+        return Factors(self.derivative[:, :-1], border)
 
     def in_direction(self, dx: FloatArray, dw: float) -> FloatArray:
         """Derivative in one direction, without the others.
@@ -276,16 +274,6 @@ class InterfaceEvaluation:
         """
         one, faster = dx[:, None], np.array([dw])
         return self._with_blades(self._marched(one, faster), one, faster)[:, 0]
-
-    @property
-    def jacobian(self) -> FloatArray:
-        """(u, u) derivative by the unknowns."""
-        return self.derivative[:, :-1]
-
-    @property
-    def by_w(self) -> FloatArray:
-        """(u,) derivative by the frequency in rad/s."""
-        return self.derivative[:, -1]
 
     def _with_blades(self, out: FloatArray, dx: FloatArray, dw: FloatArray) -> FloatArray:
         """What the period takes from the residual, overwritten, and all else of the residual."""

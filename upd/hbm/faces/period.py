@@ -196,14 +196,14 @@ def touch(f, y, state, slid, was, springs, moved):  # type: ignore[no-untyped-de
 
 @compiled
 def march_steps(  # type: ignore[no-untyped-def]
-    first, last, given, parts, bases, which, at, known, past, x0, out, sums
+    first, given, parts, bases, which, at, past, filled
 ):
-    """March samples first + 1 to last of a period.
+    """March samples first + 1 to N of a period.
 
     Parameters
     ----------
-    first, last : int
-        Samples.
+    first : int
+        Sample before the first step.
     given : bool
         Whether the first step was solved elsewhere: x0 (its forces), y and state hold its answer.
     parts : StepParts
@@ -213,21 +213,18 @@ def march_steps(  # type: ignore[no-untyped-def]
     at : tuple of ndarray
         `upd.hbm.faces.state.InterfaceState.arrays`.
         Overwritten.
-    known : bool
-        Whether the past holds a period: its samples are then what the steps start from.
-    past : Past
-        Overwritten.
-    x0 : (3 n,) ndarray
-        Overwritten by what the base gave of the last step.
-    out : (N, K) ndarray
-        Outputs, overwritten from `first` on.
-    sums : (4,) ndarray
-        Work of the excitation, lost by damping and by friction [N mm], Newton steps; added to.
+    past : tuple
+        Whether it holds a period, whose samples are then what the steps start from; `Past`,
+        overwritten.
+    filled : tuple of ndarray
+        (3 n,) what the base gave of the last step, overwritten; (N, K) outputs, overwritten from
+        `first` on; (4,) work of the excitation, lost by damping and by friction [N mm], Newton
+        steps, added to.
 
     Returns
     -------
     int
-        Where it ended: `last`, or the sample before a step without an answer.
+        Where it ended: N, or the sample before a step without an answer.
     """
     dt, drive, blades, modes, taken, damper, gap, law, outputs, springs = parts
     loss, places, held_share = modes
@@ -235,8 +232,9 @@ def march_steps(  # type: ignore[no-untyped-def]
     seen_modes, seen_drive = outputs
     q, v, p, s, sv, sa, f, y, slip, state, held = at
     bases_open, Tt, Z = bases
-    forces, moves, states, _, _ = past
-    suited, node = (bases_open, Tt), (f, y, state)
+    _, forces, moves, states, _, _ = past
+    x0, out, sums = filled
+    suited = (bases_open, Tt)
     bias = held_share * held
     c, w = begin(bases, gap, slip)
     scratch = contact_scratch(len(gap))
@@ -249,11 +247,11 @@ def march_steps(  # type: ignore[no-untyped-def]
     back, felt = np.zeros(m + r + K + L), np.zeros(L)
     before, pull = np.empty(3 * n), np.empty(r)
     slid, was = np.empty(3 * n), np.empty(n, np.int64)
-    earlier = (before, slid, was)
+    nodes = ((f, y, state), (before, slid, was))
     for d in range(3 * n):
         for place in range(L):
             felt[place] += f[d] * taken[d, m + r + K + place]
-    for step in range(first, last):
+    for step in range(first, len(which)):
         for j in range(m):
             zq[j] = blades[0, j] * q[j] + blades[1, j] * v[j] + blades[2, j] * p[j]
             zq[j] += (blades[2, j] + blades[3, j]) * bias[j]
@@ -281,7 +279,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             add_rows(x0, 1.0, inputs, every, len(inputs), Z, one)
             put(y, slid, 0)
             put(state, was, 0)
-            used = solve_sample(step, x0, suited, one, law, node, earlier, known, past, scratch)
+            used = solve_sample(step, x0, suited, one, law, nodes, past, scratch)
             if used < 0:
                 put(before, f, 0)
                 # for whoever solves the step, and comes back
@@ -341,4 +339,4 @@ def march_steps(  # type: ignore[no-untyped-def]
             for one in range(K):
                 total_of[one] += seen_drive[one, place] * drive[step + 1, place]
         put_row(total_of, out, step)
-    return last
+    return len(which)

@@ -46,18 +46,10 @@ class SteppedSine:
         Hz; shorter than asked for where the march stopped.
     amplitude : (k, K) ndarray
         Complex first harmonic of each output, of the last period [mm].
-    lowest, highest : (k, K) ndarray
-        Of the first harmonic's modulus in the last window: where it is not settled, the range in
-        which it wanders [mm].
     share : (k, 3) ndarray
         Of nodes and samples that are open, stick, slip.
     settled : (k,) ndarray of bool
         Whether the motion repeats within the tolerance.
-    remaining : (k,) ndarray
-        Estimate of what still separates it from the steady motion, over the amplitude, or of the
-        contact forces, over those, whichever is more.
-    periods : (k,) ndarray of int
-        Periods integrated.
     energy : (k, 3) ndarray
         In the last period: work of the excitation, lost by damping, lost by friction [N mm].
     harmonics : (k, h, K) ndarray
@@ -68,8 +60,8 @@ class SteppedSine:
         Its excitation [N].
     samples : int
         Steps in a period.
-    starts : tuple of InterfaceState
-        Where the last period at each frequency began, see `period_of_sweep`.
+    points : list of SteadyPoint
+        The march at each frequency.
     seconds : (k,) ndarray
         Wall time.
     state : InterfaceState
@@ -81,12 +73,8 @@ class SteppedSine:
 
     frequency: FloatArray
     amplitude: ComplexArray
-    lowest: FloatArray
-    highest: FloatArray
     share: FloatArray
     settled: NDArray[np.bool_]
-    remaining: FloatArray
-    periods: NDArray[np.int64]
     energy: FloatArray
     seconds: FloatArray
     state: InterfaceState
@@ -96,7 +84,7 @@ class SteppedSine:
     model: InterfaceModel
     drive: ComplexArray
     samples: int
-    starts: tuple[InterfaceState, ...]
+    points: list[SteadyPoint]
 
 
 def stepped_sine(
@@ -163,13 +151,9 @@ def stepped_sine(
     k, K = len(points), len(model.seen_modes)
     return SteppedSine(
         f[:k],
-        np.array([p.first_harmonic for p in points]).reshape(k, K),
-        np.array([p.lowest for p in points]).reshape(k, K),
-        np.array([p.highest for p in points]).reshape(k, K),
+        np.array([p.harmonics[0] for p in points]).reshape(k, K),
         np.array([p.last.counts for p in points]).reshape(k, 3),
         np.array([p.settled for p in points], bool),
-        np.array([p.remaining for p in points]),
-        np.array([p.periods for p in points], int),
         np.array([p.last.energy for p in points]).reshape(k, 3),
         np.array([p.seconds for p in points]),
         at,
@@ -179,7 +163,7 @@ def stepped_sine(
         model,
         np.asarray(drive, complex),
         samples,
-        tuple(p.start for p in points),
+        points,
     )
 
 
@@ -288,7 +272,7 @@ def period_of_sweep(found: SteppedSine, point: int, fallback: Fallback | None) -
     """
     f = float(found.frequency[point])
     march = InterfaceMarch(found.model, f, found.drive, found.samples, fallback)
-    start = found.starts[point]
+    start = found.points[point].start
     march.period(start.copy())
     return recorded_period(march, start)
 
@@ -297,8 +281,25 @@ def period_of_sweep(found: SteppedSine, point: int, fallback: Fallback | None) -
 class SteadyPoint:
     """The march at one frequency, until it repeats.
 
-    ``first_harmonic`` (K,) is the lowest harmonic that is excited, of every output, ``harmonics``
-    (h, K) all those excited, ``start`` where the last period began.
+    Attributes
+    ----------
+    last : InterfacePeriod
+    lowest, highest : (K,) ndarray
+        Of the first harmonic's modulus in the last window: where it is not settled, the range in
+        which it wanders [mm].
+    remaining : float
+        Estimate of what still separates it from the steady motion, over the amplitude, or of the
+        contact forces, over those, whichever is more.
+    settled : bool
+        Whether it repeats within the tolerance.
+    periods : int
+        Periods integrated.
+    seconds : float
+        Wall time.
+    harmonics : (h, K) ndarray of complex
+        Of every output, all that are excited.
+    start : InterfaceState
+        Where the last period began.
     """
 
     last: InterfacePeriod
@@ -310,11 +311,6 @@ class SteadyPoint:
     seconds: float
     harmonics: ComplexArray
     start: InterfaceState
-
-    @property
-    def first_harmonic(self) -> ComplexArray:
-        """(K,) of every output, the lowest harmonic that is excited."""
-        return np.asarray(self.harmonics[0])
 
 
 def settle(

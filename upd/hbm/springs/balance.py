@@ -67,6 +67,8 @@ class Balance:
         Synthesis matrix.
     Q : (size, samples) ndarray
         Analysis matrix.
+    transform : tuple of ndarray
+        E, its transpose, Q and its transpose, as compiled loops take them.
     loads : (n_k, m) ndarray of complex
         Dynamic loads on the modes.
     G0 : (c, c) ndarray
@@ -88,6 +90,7 @@ class Balance:
     Psi: FloatArray = field(init=False)
     E: FloatArray = field(init=False)
     Q: FloatArray = field(init=False)
+    transform: tuple[FloatArray, ...] = field(init=False)
     loads: ComplexArray = field(init=False)
     G0: FloatArray = field(init=False)
     u0: FloatArray = field(init=False)
@@ -96,11 +99,13 @@ class Balance:
     def __post_init__(self) -> None:
         Phi, free = self.modal.Phi, ~self.modal.rigid
         Psi = np.ascontiguousarray(self.contacts.B @ Phi)
+        E, Q = (of(self.harmonics, self.samples) for of in (synthesis, analysis))
         flexible = Psi[:, free] / self.modal.eigenvalues[free]
         values = {
             "Psi": Psi,
-            "E": synthesis(self.harmonics, self.samples),
-            "Q": analysis(self.harmonics, self.samples),
+            "E": E,
+            "Q": Q,
+            "transform": (E, np.ascontiguousarray(E.T), Q, np.ascontiguousarray(Q.T)),
             "loads": self.dynamic @ Phi,
             "G0": flexible @ Psi[:, free].T,
             "u0": flexible @ (Phi[:, free].T @ self.static),
@@ -118,12 +123,13 @@ class Balance:
         """
         return self.modal, self.Psi
 
-    def has_part(self, harmonic: int) -> bool:
-        """Whether the linear system is known in a harmonic above 0."""
-        return True
-
     def require_all_sectors(self, what: str) -> None:
         """Raise InputError where this is one sector of a travelling wave."""
+        if not self.linear.symmetric:
+            raise InputError(
+                f"{what}: one sector of a travelling wave is not enough; to fix it: give the "
+                "problem of all sectors, see upd.hbm.all_sectors"
+            )
 
     def modal_row(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
         """Row on the modes (m,) of a row (n_dof,) that weighs the displacements.
@@ -273,6 +279,7 @@ class Balance:
         residual : (n,) ndarray
             [mm], and [N] for the rigid equilibrium in modal coordinates.
         jacobian : BalanceJacobian or None
+            None where it is not finite, too.
         by_frequency : (n,) ndarray
             Derivative by the angular frequency; zero unless asked for.
         """
@@ -286,7 +293,7 @@ class Balance:
         if not jacobian:
             return residual, None, by_frequency
         parts = BalanceJacobian(linear, linear.k * omega, state, self.stuck_stiffness, DF)
-        return residual, parts, by_frequency
+        return residual, parts if np.isfinite(DF).all() else None, by_frequency
 
     def contact_terms(
         self, x: FloatArray, jacobian: bool
@@ -296,13 +303,8 @@ class Balance:
         begin = (START_CODE[self.start], slider, MOST_PERIODS)
         W, law = self.split(x)[0], self.contacts.law.arrays
         return contact_terms(  # type: ignore[no-any-return]
-            W, self._transform, self.harmonics.static, law, begin, jacobian
+            W, self.transform, self.harmonics.static, law, begin, jacobian
         )
-
-    def forget_factors(self) -> None:
-        """Let the factors go that corrections keep for later ones: their memory."""
-        if "linear" in self.__dict__:
-            self.linear.kept.forget()
 
     @cached_property
     def linear(self) -> LinearPart:
@@ -316,12 +318,6 @@ class Balance:
     def _each_harmonic(self) -> tuple[Modal, FloatArray]:
         """The linear system and the rows on its modes, for all harmonics above 0."""
         return self.modal, self.Psi
-
-    @cached_property
-    def _transform(self) -> tuple[FloatArray, ...]:
-        """Synthesis and analysis matrices as compiled loops take them."""
-        E, Q = self.E, self.Q
-        return E, np.ascontiguousarray(E.T), Q, np.ascontiguousarray(Q.T)
 
     def amplitudes(self, F: FloatArray, omega: float) -> ComplexArray:
         """Amplitudes (n_k, m) of the modes under the loads and contact forces F (c, size) [N]."""

@@ -27,20 +27,18 @@ inverse of a matrix, SIAM Review 31 (1989), for the low rank.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.core.kept_factors import WORTH_KEEPING, KeptFactors
-from upd.hbm.core.newton import Border, BorderedFactors, Factors
+from upd.hbm.core.factors import EPS, WORTH_KEEPING, Border, BorderedFactors, Factors, KeptFactors
 from upd.hbm.springs.modal import Modal
 from upd.hbm.springs.terms import MOVES, STICKS, bordered, by_harmonic, residual_terms
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-EPS = float(np.finfo(float).eps)
 #: operations of the factors that points held must save before they are eliminated: about what the
 #: calls of the elimination take
 WORTH = 2e6
@@ -101,11 +99,6 @@ class LinearPart:
         return self.offset + 2 * len(self.k)
 
     @property
-    def rows(self) -> int:
-        """Rows of the contacts, c."""
-        return len(self.G0)
-
-    @property
     def symmetric(self) -> bool:
         """Whether one real Psi serves all harmonics."""
         return self.Psi.ndim == 2
@@ -150,7 +143,8 @@ class LinearPart:
             )
             return found
         (loads, u0, rigid_load), o, w = acting, self.offset, self.k * omega
-        eta = self.modal.solve(w, loads - self.pushes(_complex_part(F, o)))
+        force = np.asarray((F[:, o::2] - 1j * F[:, o + 1 :: 2]).T)
+        eta = self.modal.solve(w, loads - self.pushes(force))
         mean = u0 - self.G0 @ F[:, 0] + self.R @ a
         left = W - real_part(self.moves(eta), mean, o)
         below = self.R.T @ F[:, 0] - rigid_load if o else a
@@ -158,7 +152,7 @@ class LinearPart:
         if slopes:
             slope = self.modal.solve(w, 2.0 * w[:, None] * eta - 1j * self.damped(eta))
             moved = self.moves(self.k[:, None] * slope)
-            by_omega[: W.size] = -real_part(moved, np.zeros(self.rows), o).ravel()
+            by_omega[: W.size] = -real_part(moved, np.zeros(len(self.G0)), o).ravel()
         return np.concatenate([left.ravel(), below]), by_omega
 
 
@@ -186,44 +180,29 @@ class BalanceJacobian(NamedTuple):
     DF: FloatArray
 
     @property
-    def finite(self) -> bool:
-        """Whether the derivatives are."""
-        return bool(np.isfinite(self.DF).all())
-
-    @property
     def held(self) -> FloatArray:
         """Stiffness (n_point, 1 + d) of points that stick, 0 of the others [N/mm]."""
         return np.where(self.state[:, None] == STICKS, self.stiffness, 0.0)
 
     @property
-    def kind(self) -> type[LowRank | Eliminated | EveryPoint]:
-        """The factors with the fewest unknowns."""
-        of, d1, moving = self.of, self.stiffness.shape[1], len(self.DF)
-        if of.basis is not None and of.basis.shape[1] < moving * d1:
-            return LowRank
-        n = of.rows * of.size + of.R.shape[1]
-        left = n - (len(self.state) - moving) * d1 * of.size
-        return Eliminated if 2 * (n**3 - left**3) / 3 > WORTH else EveryPoint
-
-    @property
-    def unknowns(self) -> int:
-        """Rows of its factors, without the border."""
-        of, kind, wide = self.of, self.kind, len(self.DF) * self.stiffness.shape[1]
-        if kind is EveryPoint:
-            wide = of.rows
-        elif kind is LowRank and of.basis is not None:
-            wide = of.basis.shape[1]
-        return int(wide * of.size + of.R.shape[1])
-
-    def factored(self, border: Border) -> BorderedFactors:
-        """Factors of [[J, r_p], [normal]] in scaled unknowns and equations, the cheapest way."""
-        return self.kind(self, border)
+    def kind(self) -> tuple[type[LowRank | Eliminated | EveryPoint], int]:
+        """The factors with the fewest unknowns, and how many these are without the border."""
+        of, moving = self.of, len(self.DF) * self.stiffness.shape[1]
+        rigid = of.R.shape[1]
+        n, left = (rows * of.size + rigid for rows in (len(of.G0), moving))
+        if of.basis is not None and of.basis.shape[1] < moving:
+            return LowRank, of.basis.shape[1] * of.size + rigid
+        return (Eliminated, left) if 2 * (n**3 - left**3) / 3 > WORTH else (EveryPoint, n)
 
     def bordered(self, border: Border) -> BorderedFactors:
-        """The same; large ones of an earlier point serve (`upd.hbm.core.kept_factors`)."""
-        if len(border.D) < WORTH_KEEPING or self.unknowns < WORTH_KEEPING:
-            return self.factored(border)
-        return self.of.kept.near(self, border, self.unknowns)
+        """Factors of [[J, r_p], [normal]] in scaled unknowns and equations, the cheapest way.
+
+        Large ones of an earlier point serve (`upd.hbm.core.factors`).
+        """
+        kind, unknowns = self.kind
+        if unknowns < WORTH_KEEPING:
+            return kind(self, border)
+        return self.of.kept.near(self.product, partial(kind, self), border, unknowns)
 
     def product(self, x: FloatArray) -> FloatArray:
         """J x of a change (n,) of the unknowns.
@@ -231,8 +210,8 @@ class BalanceJacobian(NamedTuple):
         The residual is linear in motion and forces: J x is that of the motion and of its forces
         without loads.
         """
-        of, n = self.of, self.of.rows * self.of.size
-        X, a = x[:n].reshape(of.rows, -1), x[n:]
+        of, n = self.of, len(self.of.G0) * self.of.size
+        X, a = x[:n].reshape(len(of.G0), -1), x[n:]
         modes = of.Psi.shape[-1]
         none = (np.zeros((len(self.w), modes), complex), np.zeros(len(X)), 0.0 * a)
         return of.residual(X, a, self.force(X), float(self.w[0] / of.k[0]), none, False)[0]
@@ -262,7 +241,7 @@ class BalanceJacobian(NamedTuple):
         """The whole matrix (n, n), with `more` empty rows and columns after them."""
         D, of, o = self.every_derivative(), self.of, self.of.offset
         n_point, d1, size = D.shape[:3]
-        c, m, D = of.rows, of.rows * size, D.reshape(n_point, d1, size, -1)
+        c, m, D = len(of.G0), len(of.G0) * size, D.reshape(n_point, d1, size, -1)
         real, imag = of.modal.receptance_parts(of.Psi, self.w)
         G = (real + 1j * imag).reshape(-1, c, n_point, d1)
         force = D[:, :, o::2] - 1j * D[:, :, o + 1 :: 2]
@@ -281,11 +260,6 @@ class BalanceJacobian(NamedTuple):
             J[m:n, :m] = np.einsum("pdr,pdl->rpl", R, D[:, :, 0]).reshape(-1, m)
         J.flat[: m * len(J) : len(J) + 1] += 1.0
         return J
-
-
-def _complex_part(X: FloatArray, o: int) -> ComplexArray:
-    """Amplitudes a - i b (n_k, c) of coefficients (c, size), the first at column o."""
-    return np.asarray((X[:, o::2] - 1j * X[:, o + 1 :: 2]).T)
 
 
 def real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
@@ -317,7 +291,7 @@ class CondensedFactors(Factors):
     def __init__(self, J: BalanceJacobian, border: Border) -> None:
         self.J = J
         dp, self.D, self.p_scale, self.normal = border
-        self.c, self.size, self.static = J.of.rows, J.of.size, J.of.offset == 1
+        self.c, self.size, self.static = len(J.of.G0), J.of.size, J.of.offset == 1
         self.n = self.c * self.size
         self.dp, self.dp_rigid = dp[: self.n].reshape(self.c, self.size), dp[self.n :]
 
@@ -360,7 +334,7 @@ class EveryPoint(CondensedFactors):
 
     def solve(self, r: FloatArray, last: float) -> FloatArray:
         """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        found = self._condensed(self._by_coefficient(r), last)
+        found = super().solve(self._by_coefficient(r), last)
         out = found.copy()
         out[: self.n].reshape(self.c, self.size)[:] = found[: self.n].reshape(self.size, self.c).T
         return out
@@ -400,8 +374,9 @@ class Eliminated(CondensedFactors):
         scaled = normal[:n].reshape(c, size)
         self.V = scaled[s] / D[:n].reshape(c, size)[s]
         # the border on the held points is one on the forces of the others
-        q = np.einsum("ks,ksm->km", _complex_part(self.V, of.offset).conj(), self.across)
-        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
+        o = of.offset
+        q = np.einsum("sk,ksm->km", self.V[:, o::2] + 1j * self.V[:, o + 1 :: 2], self.across)
+        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), o)
         column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
         border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
         across = np.concatenate([scaled[m].T.ravel(), border_rigid])
@@ -428,7 +403,7 @@ class Eliminated(CondensedFactors):
         """Scaled correction for the residual r (n,) and the right-hand side of the border."""
         n, c, size, static = self.n, self.c, self.size, self.static
         right, share, inside = self._reduced(r[:n].reshape(c, size), r[n:])
-        found = self._condensed(right, last - share)
+        found = super().solve(right, last - share)
         k, D = size * len(self.m), self.D[:n].reshape(c, size)
         out, p = np.empty(len(r) + 1), float(found[-1])
         w = found[:k].reshape(size, len(self.m)).T
@@ -495,7 +470,7 @@ class LowRank(CondensedFactors):
         moved = by_harmonic(self.G, self.G0, self.static, f)
         below = r[n:] - self.R.T @ f[:, 0]
         right = np.concatenate([(inside - moved).T.ravel(), below])
-        found = self._condensed(right, last - float((self.border * left).sum()))
+        found = super().solve(right, last - float((self.border * left).sum()))
         k = size * U.shape[1]
         y = (found[:k] * self.unit).reshape(size, -1).T
         out = np.empty(len(r) + 1)

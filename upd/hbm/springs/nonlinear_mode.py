@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -325,10 +324,13 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     stuck, omegas_stuck, number = stuck_modes(b, mode)
     shape, omega = stuck[:, number], float(omegas_stuck[number])
     of = ExtendedBalance(b, shape, omega)
+    problem = PathProblem(
+        of.function, of.scale, settings=s, shown=lambda log_a: f"amplitude {np.exp(log_a):.6g}"
+    )
     begin = wanted[0]
     for _ in range(HALVINGS):
-        first = PathProblem(of.function, of.scale, settings=s).solve(of.guess(begin), begin)
-        if first.tangent is not None:
+        first = problem.solve(of.guess(begin), begin)
+        if first is not None:
             break
         begin -= np.log(2.0)
     else:
@@ -336,7 +338,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
             f"nonlinear_mode: mode {mode} near {omega / (2.0 * np.pi):.6g} Hz is not found at any "
             f"amplitude below {np.exp(wanted[0]):.3g}: do the contacts carry a load at rest?"
         )
-    path = _over(of, first.x, float(begin), wanted, s)
+    path = _over(problem, first.x, float(begin), wanted)
     # an amplitude below those asked for was only where the path began
     kept = int(np.argmax(np.append(path.p >= wanted[0], True)))
     xs, ps = path.x[kept:], path.p[kept:]
@@ -361,20 +363,18 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     )
 
 
-def _over(
-    of: ExtendedBalance, x: FloatArray, begin: float, wanted: FloatArray, s: Settings
-) -> Path:
+def _over(problem: PathProblem, x: FloatArray, begin: float, wanted: FloatArray) -> Path:
     """The path over log a; one that stops is taken up with shorter steps at the last value wanted
     that it reached: long ones may cross from it to a closed one beside it.
     """
-    along = partial(follow, of.function, scale=of.scale, p_scale=1.0, wanted=wanted)
-    path = along((x, begin), float(wanted[-1]), settings=s)
+    path = follow(problem, (x, begin), float(wanted[-1]), wanted=wanted)
     reached = wanted[wanted <= path.p.max()]
     if path.status != "stopped" or not len(reached):
         return path
     kept = int(np.argmax(path.p >= reached[-1]))
+    s, start = problem.settings, (path.x[kept], float(path.p[kept]))
     shorter = replace(s, angle=SHORTER * s.angle, kink_step=SHORTER**2 * s.kink_step)
-    rest = along((path.x[kept], float(path.p[kept])), float(wanted[-1]), settings=shorter)
+    rest = follow(problem._replace(settings=shorter), start, float(wanted[-1]), wanted=wanted)
     return replace(
         rest,
         x=np.concatenate([path.x[:kept], rest.x]),
@@ -418,7 +418,7 @@ class ExtendedBalance:
         self, linear: LinearPart, F: FloatArray, omega: float, count: int
     ) -> ComplexArray:
         """Modal amplitudes (count, m) of the lowest harmonics above 0 under contact forces F."""
-        f = to_complex(F.reshape(linear.rows, -1), self.b.harmonics).T[:count]
+        f = to_complex(F.reshape(len(linear.G0), -1), self.b.harmonics).T[:count]
         return linear.modal.solve(linear.k[:count] * omega, -linear.pushes(f))
 
     def function(
@@ -427,7 +427,7 @@ class ExtendedBalance:
         """Residual, Jacobian and derivative by log a, as the continuation takes them."""
         b, omega, a = self.b, float(X[-2]), float(np.exp(p))
         linear, (W, rigid) = b.linear.shifted(float(X[-1])), b.split(X[:-2])
-        c, o = linear.rows, linear.offset
+        c, o = len(linear.G0), linear.offset
         F, state, moving = b.contact_terms(X[:-2], jacobian)
         found, by_omega = linear.residual(
             W.reshape(c, -1), rigid, F.reshape(c, -1), omega, self.acting, jacobian

@@ -10,17 +10,18 @@ equation and needs second derivatives.
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from upd.hbm.core.continuation import State, advance, begin
+from upd.hbm.core.continuation import advance, begin
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import PathProblem, Settings, Solution, correct
+from upd.hbm.core.newton import PathProblem, Settings, State, correct
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.sweep import FREQUENCY_SHARE, over_frequency, scale_of
+from upd.hbm.springs.sweep import FREQUENCY_SHARE, over_frequency
 from upd.labels import Shown
 
 log = logging.getLogger(__name__)
@@ -63,35 +64,6 @@ class Peak(Shown):
         return self.status == "found"
 
 
-@dataclass(frozen=True)
-class _Measure:
-    """|one harmonic| of row @ q times frequency^power, over the unknowns and the frequency."""
-
-    b: Balance
-    modal_row: FloatArray
-    place: int
-    power: float = 0.0
-
-    def __call__(self, x: FloatArray, frequency: float) -> float:
-        return float(self.amplitude(x, frequency) * frequency**self.power)
-
-    def amplitude(self, x: FloatArray, frequency: float) -> float:
-        """|row @ q| alone, mm."""
-        b, j = self.b, self.place
-        F = to_complex(b.force(x).reshape(len(b.Psi), -1), b.harmonics)[:, j]
-        w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
-        modal, Psi = b.part(int(b.harmonics.dynamic[j]))
-        eta = modal.solve(w, b.loads[j : j + 1] - F @ Psi.conj())[0]
-        return float(abs(eta @ self.modal_row))
-
-    def slope(
-        self, x: FloatArray, p: float, tangent: FloatArray, D: FloatArray, p_scale: float
-    ) -> float:
-        """Derivative along a scaled direction (n_unknown + 1,), by central differences."""
-        h, dx, dp = EPS ** (1 / 3), tangent[:-1] * D, float(tangent[-1] * p_scale)
-        return float((self(x + h * dx, p + h * dp) - self(x - h * dx, p - h * dp)) / (2 * h))
-
-
 def climb(
     b: Balance,
     row: ArrayLike,
@@ -132,62 +104,75 @@ def climb(
     InputError
         For a harmonic that is not kept, or a row of another length.
     """
-    measure = _Measure(b, b.modal_row(row, harmonic), b.harmonics.place(harmonic), power)
-    p_scale = FREQUENCY_SHARE * frequency
-    problem = PathProblem(over_frequency(b), scale_of(b), p_scale, settings or Settings())
+    modal_row, j = b.modal_row(row, harmonic), b.harmonics.place(harmonic)
+    problem = over_frequency(b, FREQUENCY_SHARE * frequency, settings)
+    k = int(b.harmonics.dynamic[j])
+    modal, Psi = b.part(k)
 
-    def slope(state: State) -> float:
-        return measure.slope(state.x, state.p, state.tangent, problem.scale(state.x), p_scale)
+    def amplitude(x: FloatArray, f: float) -> float:
+        F = to_complex(b.force(x).reshape(len(b.Psi), -1), b.harmonics)[:, j]
+        eta = modal.solve(np.array([2 * np.pi * k * f]), b.loads[j : j + 1] - F @ Psi.conj())[0]
+        return float(abs(eta @ modal_row))
+
+    def slope(at: State, D: FloatArray) -> float:
+        """Of the weighed amplitude along the tangent, by central differences."""
+        h, dx, dp = EPS ** (1 / 3), at.tangent[:-1] * D, float(at.tangent[-1] * problem.p_scale)
+        up, down = (
+            amplitude(at.x + d * dx, at.p + d * dp) * (at.p + d * dp) ** power for d in (h, -h)
+        )
+        return float((up - down) / (2 * h))
 
     def peak(state: State, status: str) -> Peak:
-        return Peak(state.p, measure.amplitude(state.x, state.p), state.x, status)
+        return Peak(state.p, amplitude(state.x, state.p), state.x, status)
 
     here = begin(problem, x, frequency)._replace(step=reach)
-    if slope(here) < 0:
+    if slope(here, problem.scale(here.x)) < 0:
         # to be left in the opposite direction
         here = here._replace(tangent=-here.tangent, sign=-here.sign)
     for _ in range(MOST_STEPS):
         there = advance(problem, here)
         if there is None:
             return peak(here, "no convergence along the path")
-        if slope(there) > 0:
+        if slope(there, problem.scale(there.x)) > 0:
             here = there
             continue
         way = np.linalg.norm((there.x - here.x) / problem.scale(here.x))
-        length = float(np.hypot(way, (there.p - here.p) / p_scale))
-        top = _between(problem, measure, here, length)
+        length = float(np.hypot(way, (there.p - here.p) / problem.p_scale))
+        top = _between(problem, slope, here, length)
         if top is not None:
-            return top
+            return peak(top, "found")
         if length <= POSITION:
             return max(peak(here, "found"), peak(there, "found"), key=lambda found: found.amplitude)
         here = here._replace(step=length / 4)
     return peak(here, f"still rising after {MOST_STEPS} steps")
 
 
-def _between(problem: PathProblem, measure: _Measure, base: State, reach: float) -> Peak | None:
+def _between(
+    problem: PathProblem, slope: Callable[[State, FloatArray], float], base: State, reach: float
+) -> State | None:
     """The peak between the base and the plane at `reach`.
 
     Root of the slope, or its jump where a contact changes state.
     """
     D, p_scale = problem.scale(base.x), problem.p_scale
-    best = [Solution(base.x, base.p, base.tangent, 0)]
+    best = [base]
 
-    def slope(share: float) -> float:
+    def slope_at(share: float) -> float:
         way, along = share * reach, base.tangent
         x, p = base.x + way * along[:-1] * D, base.p + way * float(along[-1]) * p_scale
         found = correct(problem, x, p, D, along)
-        if found.tangent is None:
+        if found is None:
             raise ArithmeticError
         best[0] = found
-        return measure.slope(found.x, found.p, found.tangent, D, p_scale)
+        return slope(found, D)
 
     try:
-        if slope(0.0) <= 0 or slope(1.0) >= 0:
+        if slope_at(0.0) <= 0 or slope_at(1.0) >= 0:
             return None
-        slope(brentq(slope, 0.0, 1.0, xtol=POSITION))
+        slope_at(brentq(slope_at, 0.0, 1.0, xtol=POSITION))
     except ArithmeticError:
         return None
-    return Peak(best[0].p, measure.amplitude(best[0].x, best[0].p), best[0].x, "found")
+    return best[0]
 
 
 def is_near(frequency: float, height: float) -> bool:

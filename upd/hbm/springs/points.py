@@ -251,12 +251,7 @@ def contacts(
     """
     n = np.atleast_2d(np.asarray(normal, dtype=float))
     t = np.asarray(tangents, dtype=float)
-    if t.size == 0:
-        t = t.reshape(0, *n.shape)
-    elif t.ndim > 2:
-        t = t.reshape(-1, *t.shape[-2:])
-    else:
-        t = np.atleast_2d(t)[None]
+    t = t.reshape(-1, *np.atleast_2d(t).shape[-2:]) if t.size else t.reshape(0, *n.shape)
     problems = []
     if t.shape[1:] != n.shape or len(t) > 2:
         problems.append(
@@ -266,9 +261,9 @@ def contacts(
         problems.append(
             "k_t is missing; to fix it: give the tangential stiffness of the points with friction"
         )
-    given = {"k_n": k_n, "k_t": 1.0 if k_t is None else k_t, "mu": mu, "preload": preload}
-    given["gap"] = gap
-    numbers = {name: _spread(value, len(n), name, problems) for name, value in given.items()}
+    values = (k_n, 1.0 if k_t is None else k_t, mu, preload, gap)
+    given = zip(("k_n", "k_t", "mu", "preload", "gap"), values, strict=True)
+    numbers = {name: _spread(value, len(n), name, problems) for name, value in given}
     problems += [f"{name} must be >= 0" for name in ("k_n", "mu") if np.any(numbers[name] < 0)]
     if np.any(numbers["k_t"] <= 0):
         problems.append("k_t must be above 0; for frictionless points give mu = 0")

@@ -107,7 +107,7 @@ class FrequencyResponse(Measures):
             len(self.frequency), len(self.balance.Psi), self.harmonics.size
         )
         rigid = self.x[:, self.balance.size - self.balance.rigid :]
-        return self.balance.displacement(self._omega, force, rigid)
+        return self.balance.displacement(2 * np.pi * self.frequency, force, rigid)
 
     def amplitude(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
         """Amplitude of one harmonic along the path.
@@ -187,14 +187,14 @@ class FrequencyResponse(Measures):
 
         Zero up to the tolerance of the solver.
         """
-        b, k = self.balance, self.harmonics.dynamic
+        b, k, omegas = self.balance, self.harmonics.dynamic, 2 * np.pi * self.frequency
         force = self.contact_force.reshape(len(self.frequency), len(b.Psi), -1)
         work, lost = np.zeros((2, len(force)))
-        for i, (F, omega) in enumerate(zip(force, self._omega, strict=True)):
+        for i, (F, omega) in enumerate(zip(force, omegas, strict=True)):
             eta = b.amplitudes(F, float(omega))
             work[i] = np.pi * np.einsum("k,km,km", k, b.loads, eta.conj()).imag
             lost[i] = np.einsum("k,km,km", k**2.0, eta.conj(), b.linear.damped(eta)).real
-        viscous = np.pi * self._omega * lost
+        viscous = np.pi * omegas * lost
         total = np.abs(work) + np.abs(viscous) + self.energy.sum(axis=1)
         return np.asarray(
             (work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0)
@@ -236,10 +236,6 @@ class FrequencyResponse(Measures):
             if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
                 return top.frequency, top.amplitude
         return parabola(self.frequency, a)
-
-    @property
-    def _omega(self) -> FloatArray:
-        return 2 * np.pi * self.frequency
 
     def _linear(
         self, row: ArrayLike, frequencies: ArrayLike | None, harmonic: int | None, stuck: bool
@@ -396,7 +392,7 @@ def response_of(
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     with threads_for(b.size):
         b, curve = solve_curve(b, order, fast_exits, settings)
-        b.forget_factors()
+        b.linear.kept.forget()
         return _answer(b, curve)
 
 
@@ -407,8 +403,10 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
     status = "not periodic" if curve.status == "complete" and astray else curve.status
     notes = []
     if worst > TRUNCATION:
+        h = b.harmonics
+        omitted = [*(str(k) for k in range(h.highest) if k not in h.numbers), f"above {h.highest}"]
         notes.append(
-            f"the omitted harmonics ({_omitted(b.harmonics)}) would move the contacts by up to "
+            f"the omitted harmonics ({', '.join(omitted)}) would move the contacts by up to "
             f"{100.0 * worst:.3g} %: take more harmonics"
         )
     if astray:
@@ -435,11 +433,6 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
         status=cast(Status, status),
         message="; ".join([curve.message, *notes]),
     )
-
-
-def _omitted(h: Harmonics) -> str:
-    between = [k for k in range(h.highest) if k not in h.numbers]
-    return ", ".join([*map(str, between), f"above {h.highest}"])
 
 
 class GivenSystem(NamedTuple):

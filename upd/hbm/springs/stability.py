@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -182,21 +181,10 @@ def _label(multipliers: ComplexArray, near: float, marginal: bool) -> str:
     return OSCILLATING if (np.abs(multipliers) > 1.0 + near).any() else STABLE
 
 
-class Changes(NamedTuple):
-    """Derivatives of the contact law at n steps of a period, c = (1 + d) n_point rows, s sliders.
-
-    Attributes
-    ----------
-    A, B : (n, c, c), (n, c, s) ndarray
-        Of the forces by displacements and by the sliders before the step.
-    X, Y : (n, s, c), (n, s, s) ndarray
-        Of the sliders after the step by the same.
-    """
-
-    A: FloatArray
-    B: FloatArray
-    X: FloatArray
-    Y: FloatArray
+#: derivatives of the contact law at n steps of a period, by displacements and by sliders before the
+#: step: A (n, c, c) and B (n, c, s) of the forces on c = (1 + d) n_point rows, X (n, s, c) and
+#: Y (n, s, s) of the s sliders after it
+Changes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def changes(b: Balance, w: FloatArray, force: FloatArray) -> Changes:
@@ -214,10 +202,11 @@ def changes(b: Balance, w: FloatArray, force: FloatArray) -> Changes:
     """
     n_point, rows, n = w.shape
     c, s, law = n_point * rows, n_point * (rows - 1), b.contacts.law
-    out = Changes(*(np.zeros((n, *shape)) for shape in ((c, c), (c, s), (s, c), (s, s))))
+    A, B = np.zeros((n, c, c)), np.zeros((n, c, s))
+    X, Y = np.zeros((n, s, c)), np.zeros((n, s, s))
     k_t = b.stuck_stiffness[:, 1:].max(axis=1, initial=0.0)
-    _fill(w, force, law.arrays, k_t, tuple(out))
-    return out
+    _fill(w, force, law.arrays, k_t, (A, B, X, Y))
+    return A, B, X, Y
 
 
 @compiled
@@ -300,7 +289,7 @@ def period_map(
         S = np.linalg.inv(np.eye(len(L)) + 0.5 * dt * C + 0.25 * dt**2 * np.diagflat(L))
     with threads_for(len(Psi)):
         linear = np.ascontiguousarray(Psi), L, np.ascontiguousarray(C), S
-        return np.asarray(_map(linear, tuple(of), dt))
+        return np.asarray(_map(linear, of, dt))
 
 
 @compiled

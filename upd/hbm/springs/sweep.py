@@ -13,18 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.core.continuation import Path, follow
+from upd.hbm.core.continuation import follow
+from upd.hbm.core.factors import EPS, FactorsOf
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.core.newton import EPS, Function, PathProblem, Scale, Settings
+from upd.hbm.core.newton import Function, PathProblem, Scale, Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import separated, sticking_preload, stuck_points
-from upd.hbm.springs.jacobian import BalanceJacobian
 from upd.hbm.springs.terms import unit_sizes
 
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
-Linearised = tuple[FloatArray, BalanceJacobian | None, FloatArray]
+Linearised = tuple[FloatArray, FactorsOf | None, FloatArray]
 #: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is
 #: one unit wide
 FREQUENCY_SHARE = 0.05
@@ -183,16 +183,9 @@ def _stretch(
         return Curve(f[:0], np.zeros((0, b.size)), np.zeros(0, dtype=bool), "stopped", message)
     if begin == end:
         return Curve(np.array([begin]), x[None], np.zeros(1, dtype=bool), "complete", "")
-    path: Path = follow(
-        over_frequency(b),
-        (x, begin),
-        end,
-        scale=scale_of(b),
-        p_scale=FREQUENCY_SHARE * float(np.mean(f)),
-        wanted=wanted,
-        turned=float(f[0] - BEHIND * (f[-1] - f[0])),
-        settings=settings,
-    )
+    problem = over_frequency(b, FREQUENCY_SHARE * float(np.mean(f)), settings)
+    behind = float(f[0] - BEHIND * (f[-1] - f[0]))
+    path = follow(problem, (x, begin), end, wanted=wanted, turned=behind)
     p, message = path.p[known:], "" if path.status == "complete" else path.message
     return Curve(p, path.x[known:], np.zeros(len(p), dtype=bool), path.status, message)
 
@@ -262,15 +255,23 @@ def first_point(
     statics = static_point(b, frequency, settings)
     if statics is None:
         return None
-    return _to_one(b, over_load(b, frequency), statics, b.stuck(omega), settings)
+    none, zero = b.unexcited(), np.zeros(b.size)
+    slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
+
+    def raised(x: FloatArray, s: float, jacobian: bool) -> Linearised:
+        """Residual over a factor on the dynamic loads, linear in it."""
+        residual, factors, _ = _linearised(none, x, omega, jacobian)
+        return residual + s * slope, factors, slope
+
+    return _to_one(b, raised, statics, b.stuck(omega), settings)
 
 
 def _to_one(
     b: Balance, function: Function, x: FloatArray, like: FloatArray, settings: Settings | None
 ) -> FloatArray | None:
     """The answer at 1 of a parameter by continuation from one at 0; `like` has its size."""
-    scale = scale_of(b, like)
-    path = follow(function, (x, 0.0), 1.0, scale=scale, p_scale=1.0, settings=settings)
+    problem = PathProblem(function, scale_of(b, like), settings=settings or Settings())
+    path = follow(problem, (x, 0.0), 1.0)
     return path.x[-1] if path.status == "complete" else None
 
 
@@ -294,8 +295,8 @@ def newton(
         None when it does not converge.
     """
     patient = replace(settings or Settings(), iterations=PATIENCE)
-    found = PathProblem(over_frequency(b), scale_of(b), settings=patient).solve(x, frequency)
-    return found.x if found.tangent is not None else None
+    found = over_frequency(b, 1.0, patient).solve(x, frequency)
+    return None if found is None else found.x
 
 
 def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -> FloatArray | None:
@@ -317,7 +318,8 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
     (n_unknown,) ndarray or None
         None when the path does not arrive.
     """
-    x = b.stuck(2 * np.pi * frequency)
+    omega = 2 * np.pi * frequency
+    x = b.stuck(omega)
     P = sticking_preload(b, x)
     if not np.all(np.isfinite(P)):
         return None
@@ -325,7 +327,17 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
     pressed = newton(b.pressed(P), x, frequency, settings)
     if pressed is None or not np.any(P):
         return pressed
-    return _to_one(b, over_preload(b, frequency, P), pressed, pressed, settings)
+
+    def released(x: FloatArray, q: float, jacobian: bool) -> Linearised:
+        """Residual with (1 - q) P more preload balanced by as much static load."""
+        residual, factors, _ = _linearised(b.pressed((1 - q) * P), x, omega, jacobian)
+        h = EPS ** (1 / 3)
+        if not jacobian:
+            return residual, None, np.zeros(b.size)
+        up, down = (b.pressed((1 - q - d) * P).linearised(x, omega, False)[0] for d in (h, -h))
+        return residual, factors, (up - down) / (2 * h)
+
+    return _to_one(b, released, pressed, pressed, settings)
 
 
 def static_point(
@@ -364,51 +376,32 @@ def static_point(
     return None if x is None else b.embedded(x, rest)
 
 
-def over_frequency(b: Balance) -> Function:
-    """Residual over frequency for the continuation.
+def _linearised(b: Balance, x: FloatArray, omega: float, jacobian: bool) -> Linearised:
+    """Residual, what gives the factors of its Jacobian, derivative by omega."""
+    residual, parts, slope = b.linearised(x, omega, jacobian)
+    return residual, None if parts is None else parts.bordered, slope
+
+
+def over_frequency(b: Balance, p_scale: float, settings: Settings | None) -> PathProblem:
+    """The balance over the frequency in Hz for the continuation.
 
     Parameters
     ----------
     b : Balance
+    p_scale : float
+        Size of the frequency [Hz].
+    settings : Settings or None
 
     Returns
     -------
-    callable
-        (x, frequency [Hz], with Jacobian) -> residual, Jacobian or None, derivative by the
-        frequency.
+    PathProblem
     """
 
     def function(x: FloatArray, f: float, jacobian: bool) -> Linearised:
-        residual, parts, slope = b.linearised(x, 2 * np.pi * f, jacobian)
-        return residual, parts, 2 * np.pi * slope
+        residual, factors, slope = _linearised(b, x, 2 * np.pi * f, jacobian)
+        return residual, factors, 2 * np.pi * slope
 
-    return function
-
-
-def over_load(b: Balance, frequency: float) -> Function:
-    """Residual over a factor on the dynamic loads at one frequency; linear in the factor.
-
-    Parameters
-    ----------
-    b : Balance
-    frequency : float
-        [Hz]
-
-    Returns
-    -------
-    callable
-        (x, factor, with Jacobian) -> residual, Jacobian or None, derivative by the factor.
-    """
-    omega = 2 * np.pi * frequency
-    none = b.unexcited()
-    zero = np.zeros(b.size)
-    slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
-
-    def function(x: FloatArray, s: float, jacobian: bool) -> Linearised:
-        residual, parts, _ = none.linearised(x, omega, jacobian)
-        return residual + s * slope, parts, slope
-
-    return function
+    return PathProblem(function, scale_of(b), p_scale, settings or Settings(), "{:.9g} Hz".format)
 
 
 def scale_of(b: Balance, least: FloatArray | None = None, *, by_energy: bool = True) -> Scale:
@@ -459,34 +452,3 @@ def scale_of(b: Balance, least: FloatArray | None = None, *, by_energy: bool = T
         return D
 
     return scale
-
-
-def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
-    """Residual over q, with (1 - q) P more preload balanced by as much static load.
-
-    q = 0 sticks when P is enough, q = 1 is the problem.
-
-    Parameters
-    ----------
-    b : Balance
-    frequency : float
-        [Hz]
-    P : (n_point,) ndarray
-        Extra preload [N].
-
-    Returns
-    -------
-    callable
-        (x, q, with Jacobian) -> residual, Jacobian or None, derivative by q.
-    """
-    omega = 2 * np.pi * frequency
-
-    def function(x: FloatArray, q: float, jacobian: bool) -> Linearised:
-        residual, parts, _ = b.pressed((1 - q) * P).linearised(x, omega, jacobian)
-        h = EPS ** (1 / 3)
-        if not jacobian:
-            return residual, None, np.zeros(b.size)
-        up, down = (b.pressed((1 - q - d) * P).linearised(x, omega, False)[0] for d in (h, -h))
-        return residual, parts, (up - down) / (2 * h)
-
-    return function

@@ -216,28 +216,16 @@ def steady_state(
     b.require_all_sectors("time integration")
     omega = 2 * np.pi * frequency
     dt = 2 * np.pi / omega / steps
-    state = _initial(b, omega, x)
-    load = _load(b, steps)
-    m = len(b.modal.eigenvalues)
-    damping = np.diag(b.modal.damping) if b.modal.proportional else b.modal.damping
-    beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
-    S = np.linalg.inv(
-        np.eye(m)
-        + (1 + alpha) * (gamma * dt * damping + beta * dt**2 * np.diag(b.modal.eigenvalues))
-    )
-    Gamma = np.ascontiguousarray((1 + alpha) * beta * dt**2 * b.Psi @ S @ b.Psi.T)
-    c, law = len(b.Psi), b.contacts.law
+    state, load, linear = _initial(b, omega, x), _load(b, steps), _linear(b, dt, float(alpha))
+    (c, m), law = b.Psi.shape, b.contacts.law
     W, F, X = np.zeros((c, steps)), np.zeros((c, steps)), np.zeros((m, steps))
-    linear = (np.ascontiguousarray(damping), b.modal.eigenvalues, S, b.Psi, Gamma)
     # contact stiffness against that of a step multiplies the rounding of the displacement
-    stiff = float(np.abs(Gamma).max() * max(law.k_n.max(), law.k_t.max()))
-    tolerated = 1e4 * EPS * (1 + stiff)
+    tolerated = 1e4 * EPS * (1 + np.abs(linear[-1]).max() * max(law.k_n.max(), law.k_t.max()))
     d1, out = 1 + b.contacts.tangents, (W, F, X)
     change, status, period, before = np.inf, "period limit", 0, np.zeros_like(X)
     while period < most_periods:
         period += 1
-        good = _period(state, load, (dt, float(alpha)), linear, law.arrays, d1, tolerated, out)
-        if not good:
+        if not _period(state, load, (dt, float(alpha)), linear, law.arrays, d1, tolerated, out):
             status = "no convergence"
             break
         size = float(np.abs(X - X.mean(axis=1, keepdims=True)).max())
@@ -246,15 +234,29 @@ def steady_state(
             status = "periodic"
             break
         before = X.copy()
+    message = f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz"
+    message += f", last change {change:.1e}"
     shape = (b.contacts.n_point, d1, steps)
-    message = (
-        f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz, last change "
-        f"{change:.1e}"
-    )
     coefficients = b.modal.Phi @ (X @ analysis(b.harmonics, steps).T)
     return SteadyState(
         coefficients, W.reshape(shape), F.reshape(shape), period, change, status, message
     )
+
+
+def _load(b: Balance, steps: int) -> FloatArray:
+    theta = 2 * np.pi * np.arange(steps + 1) / steps
+    waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
+    return np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)
+
+
+def _linear(b: Balance, dt: float, alpha: float) -> tuple[FloatArray, ...]:
+    """Damping, eigenvalues, inverse of a step's matrix, rows, and their compliance in a step."""
+    modal, beta, gamma = b.modal, (1 - alpha) ** 2 / 4, 0.5 - alpha
+    damping = np.diag(modal.damping) if modal.proportional else modal.damping
+    own = gamma * dt * damping + beta * dt**2 * np.diag(modal.eigenvalues)
+    S = np.asarray(np.linalg.inv(np.eye(len(own)) + (1 + alpha) * own), float)
+    Gamma = np.ascontiguousarray((1 + alpha) * beta * dt**2 * b.Psi @ S @ b.Psi.T)
+    return np.ascontiguousarray(damping), modal.eigenvalues, S, b.Psi, Gamma
 
 
 def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
@@ -275,9 +277,3 @@ def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
     T = np.zeros((len(force), 2))
     T[:, : b.contacts.tangents] = force[:, 1:]
     return displacement, velocity, acceleration, b.Psi @ displacement, force.ravel(), T
-
-
-def _load(b: Balance, steps: int) -> FloatArray:
-    theta = 2 * np.pi * np.arange(steps + 1) / steps
-    waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
-    return np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)

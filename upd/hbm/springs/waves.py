@@ -111,13 +111,11 @@ class WaveBalance(Balance):
         """Index of the wave of a harmonic, 0 to N - 1."""
         return harmonic * self.engine_order % self.n_sectors
 
-    def has_part(self, harmonic: int) -> bool:
-        """As of `Balance`: whether the modes of its nodal diameter are known."""
-        n = self.number(harmonic)
-        return min(n, self.n_sectors - n) in self.modes
-
     def part(self, harmonic: int | None = None) -> tuple[Modal, Any]:
-        """As of `Balance`, with complex modes and rows."""
+        """As of `Balance`, with complex modes and rows.
+
+        Raises KeyError without the modes of its nodal diameter.
+        """
         first, N = int(self.harmonics.dynamic[0]), self.n_sectors
         n = self.number(first if harmonic is None else harmonic)
         if n not in self._parts:
@@ -127,13 +125,6 @@ class WaveBalance(Balance):
             rows = (self.near + self.far * phase_of(n, N)).reshape(-1, len(m.Phi))
             self._parts[n] = m, rows @ m.Phi
         return self._parts[n]
-
-    def require_all_sectors(self, what: str) -> None:
-        """As of `Balance`."""
-        raise InputError(
-            f"{what}: one sector of a travelling wave is not enough; to fix it: give the problem "
-            "of all sectors, see upd.hbm.all_sectors"
-        )
 
     @property
     def _each_harmonic(self) -> tuple[Modal, Any]:
