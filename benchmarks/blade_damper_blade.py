@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response
+from upd.hbm import Contacts, FrequencyResponse, System, contacts, frequency_response
 
 Array = NDArray[np.float64]
 M = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
@@ -45,17 +45,19 @@ def wedge() -> Contacts:
     return contacts(normal, tangent, k_n=3e5, k_t=3e5, mu=0.5)
 
 
-def response(frequencies: Any, highest: int, samples: int, **options: Any) -> FrequencyResponse:
+def response(
+    frequencies: Any, highest: int, samples: int, start: Any = "zero"
+) -> FrequencyResponse:
     """The curve at the frequencies in Hz with the harmonics 0 to `highest`."""
     return frequency_response(
-        M,
-        C,
-        stiffness(),
-        wedge(),
-        static_force=STATIC,
+        System(
+            (M, C, stiffness()),
+            wedge(),
+            static_force=STATIC,
+            harmonics=range(highest + 1),
+            samples=samples,
+            start=start,
+        ),
         harmonic_force=HARMONIC,
         frequencies=frequencies,
-        harmonics=range(highest + 1),
-        samples=samples,
-        **options,
     )

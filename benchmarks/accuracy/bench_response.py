@@ -14,7 +14,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.plan import grid
-from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm import FrequencyResponse, System, contacts, frequency_response
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
 from upd.hbm.springs.points import march
 from upd.hbm.springs.response import parabola
@@ -65,16 +65,12 @@ def oscillator(
     rad/s.
     """
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
-    given = {"harmonics": (1,), "samples": 1024} | options
+    given: dict[str, Any] = {"harmonics": (1,), "samples": 1024} | options
     return frequency_response(
-        [[1.0]],
-        [[0.0]],
-        [[1.0]],
-        slider,
+        System(([[1.0]], [[0.0]], [[1.0]]), slider, **given),
         harmonic_force=[load],
         frequencies=np.asarray(w) * HZ,
-        **given,
-    )  # type: ignore[arg-type]
+    )
 
 
 def jenkins() -> Iterator[Row]:

@@ -29,7 +29,7 @@ from upd.analyses.forced.model import make_model
 from upd.analyses.forced.performance import mode_over_amplitude
 from upd.analyses.forced.statics import face_laws, static_state
 from upd.analyses.seated.bodies import make_bodies
-from upd.hbm import NonlinearMode, contacts, nonlinear_mode
+from upd.hbm import NonlinearMode, System, contacts, nonlinear_mode
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -86,15 +86,15 @@ def ours(of: Callable[[], NonlinearMode]) -> tuple[NonlinearMode, float]:
 def benchmark(mode: int) -> NonlinearMode:
     """A mode of the blade-damper-blade problem."""
     return nonlinear_mode(
-        public.M,
-        public.C,
-        public.stiffness(),
-        public.wedge(),
+        System(
+            (public.M, public.C, public.stiffness()),
+            public.wedge(),
+            harmonics=range(HARMONICS + 1),
+            samples=SAMPLES,
+            static_force=public.STATIC,
+        ),
         mode=mode,
         amplitudes=np.geomspace(*ENDS[mode], 40),
-        harmonics=range(HARMONICS + 1),
-        samples=SAMPLES,
-        static_force=public.STATIC,
     )
 
 
@@ -102,13 +102,9 @@ def oscillator() -> NonlinearMode:
     """m = k = 1 with a Jenkins element."""
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=0.25, mu=1.0, preload=1.0)
     return nonlinear_mode(
-        [[1.0]],
-        [[0.0]],
-        [[1.0]],
-        slider,
+        System(([[1.0]], [[0.0]], [[1.0]]), slider, samples=1024),
         mode=1,
         amplitudes=np.union1d(np.geomspace(4.1, 100.0, 40), [*JENKINS]),
-        samples=1024,
     )
 
 

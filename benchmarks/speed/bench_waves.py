@@ -15,6 +15,7 @@ import numpy as np
 
 from upd.hbm import (
     FrequencyResponse,
+    System,
     contact_rows,
     contacts,
     nodal_diameters,
@@ -48,16 +49,18 @@ def response(n_sectors: int) -> FrequencyResponse:
         rows[part, :, side * SIZE : (side + 1) * SIZE] = -np.array(frames)[part] @ motion
     points = contacts(rows[:, 0], np.swapaxes(rows[:, 1:], 0, 1), k_n=4e4, k_t=3e4, mu=0.3)
     return travelling_wave_response(
-        disk,
-        points,
+        System(
+            disk,
+            points,
+            harmonics=HARMONICS,
+            damper=damper,
+            damper_rows=contact_rows(damper, places, frames),
+            start="frictionless",
+        ),
         n_sectors=n_sectors,
         engine_order=order,
         harmonic_force=0.2 * rng.normal(size=SIZE),
         frequencies=FREQUENCIES,
-        harmonics=HARMONICS,
-        damper=damper,
-        damper_rows=contact_rows(damper, places, frames),
-        start="frictionless",
     )
 
 

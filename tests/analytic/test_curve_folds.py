@@ -10,7 +10,7 @@ import pytest
 
 from upd.analyses.forced.curves import ForcedCurve, PointCurve, rising
 from upd.analyses.forced.peaks import folds_of
-from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm import FrequencyResponse, System, contacts, frequency_response
 from upd.hbm.springs.time_integration import steady_state
 
 
@@ -104,15 +104,15 @@ def softening() -> FrequencyResponse:
         preload=[0.5, 0.02],
     )
     return frequency_response(
-        [[1.0]],
-        [[0.02]],
-        [[1.0]],
-        points,
+        System(
+            ([[1.0]], [[0.02]], [[1.0]]),
+            points,
+            static_force=[0.5],
+            harmonics=range(8),
+            samples=512,
+        ),
         harmonic_force=[0.15],
-        static_force=[0.5],
         frequencies=np.linspace(1.2, 1.5, 40) / (2.0 * np.pi),
-        harmonics=range(8),
-        samples=512,
     )
 
 

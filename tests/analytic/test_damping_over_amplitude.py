@@ -17,7 +17,7 @@ from upd.analyses.forced.checks import check_solution
 from upd.analyses.forced.performance import ModeCurve, first_slip, mode_results
 from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
-from upd.hbm import contacts, nonlinear_mode
+from upd.hbm import System, contacts, nonlinear_mode
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -84,7 +84,7 @@ def test_first_slip_by_hand() -> None:
     """One mass on a slider: mu N = k_t a / omega^0 at a = 4."""
     jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=0.25, mu=1.0, preload=1.0)
     b = nonlinear_mode(
-        [[1.0]], [[0.0]], [[1.0]], jenkins, mode=1, amplitudes=[0.1], harmonics=(0, 1)
+        System(([[1.0]], [[0.0]], [[1.0]]), jenkins, harmonics=(0, 1)), mode=1, amplitudes=[0.1]
     ).balance
     assert first_slip(b, np.ones(1), 1.0) == pytest.approx(4.0, rel=1e-12)
     slides = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=0.25, mu=0.0, preload=1.0)

@@ -5,12 +5,15 @@ Oscillator on a Jenkins element, Den Hartog, linear limits, a rigid damper in it
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from upd.hbm import (
     FrequencyResponse,
     Settings,
+    System,
     contact_rows,
     contacts,
     frequency_response,
@@ -37,13 +40,17 @@ def oscillator(
     k_t: float = K_T,
     c: float = 0.0,
     load: float = F,
-    **options: object,
+    fast_exits: bool = True,
+    **options: Any,
 ) -> FrequencyResponse:
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
-    given = {"harmonics": (1,), "samples": 1024} | options
+    given: dict[str, Any] = {"harmonics": (1,), "samples": 1024} | options
     return frequency_response(
-        [[1.0]], [[c]], [[K]], slider, harmonic_force=[load], frequencies=w * HZ, **given
-    )  # type: ignore[arg-type]
+        System(([[1.0]], [[c]], [[K]]), slider, **given),
+        harmonic_force=[load],
+        frequencies=w * HZ,
+        fast_exits=fast_exits,
+    )
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.6])
@@ -137,17 +144,15 @@ def wedge(angle: float, CF: float, mu: float, load: float) -> FrequencyResponse:
     force = np.zeros(6)
     force[0], force[3] = load, -load
     return frequency_response(
-        np.eye(6),
-        0.02 * np.eye(6),
-        np.eye(6),
-        points,
+        System(
+            (np.eye(6), 0.02 * np.eye(6), np.eye(6)),
+            points,
+            damper=damper,
+            damper_rows=contact_rows(damper, positions, frames),
+            samples=256,
+        ),
         harmonic_force=force,
         frequencies=[0.3, 0.31],
-        damper=damper,
-        damper_rows=contact_rows(damper, positions, frames),
-        samples=256,
-        # the load works two thousand times as much to and fro as it loses: solved to rounding, for
-        # the balance of energy
         settings=Settings(tolerance=1e-15),
     )
 
@@ -196,14 +201,14 @@ def test_points_that_always_stick_lose_nothing(harmonics: range, fast_exits: boo
         0.3 * np.eye(2, 4), [np.eye(2, 4, 1)], k_n=2.0, k_t=1.0, mu=0.5, preload=[60.0, 90.0]
     )
     answer = frequency_response(
-        np.eye(4),
-        0.02 * stiff,
-        stiff,
-        points,
+        System(
+            (np.eye(4), 0.02 * stiff, stiff),
+            points,
+            static_force=points.rows[:, 0].T @ points.law.preload,
+            harmonics=harmonics,
+        ),
         harmonic_force=[1.0, 0.5, 0.0, 0.2],
-        static_force=points.rows[:, 0].T @ points.law.preload,
         frequencies=np.linspace(0.1, 0.6, 12),
-        harmonics=harmonics,
         fast_exits=fast_exits,
     )
     assert answer.state[..., 0].min() == 1.0

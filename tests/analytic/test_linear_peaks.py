@@ -1,14 +1,12 @@
 """Peaks of the linear limits and widths of a path's against closed forms of one mode."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import Limit, finer, linear_modes
-from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm import FrequencyResponse, System, contacts, frequency_response
 
 C, F = 0.004, 3.0
 ROW = np.array([1.0])
@@ -32,7 +30,9 @@ def test_peak_of_one_mode_in_closed_form(points: int, stuck: bool, stiffness: fl
     f0 = np.sqrt(stiffness) / (2.0 * np.pi)
     grid = np.linspace(0.7 * f0, 1.4 * f0, points)
     answer = frequency_response(
-        [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
+        System(([[1.0]], [[C]], [[1.0]]), slider, harmonics=(1,)),
+        harmonic_force=[F],
+        frequencies=grid,
     )
     zeta = C / (2.0 * np.sqrt(stiffness))
     frequency, width = linear_modes(answer.balance, stuck)
@@ -52,11 +52,11 @@ def test_finer_frequencies_show_the_peak_of_a_path(points: int) -> None:
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=2.0, mu=1.0, preload=1e6)
     f0 = np.sqrt(3.0) / (2.0 * np.pi)
     grid = np.linspace(0.7 * f0, 1.41 * f0, points)
-    over: dict[str, Any] = {"harmonic_force": [F], "harmonics": (1,)}
-    coarse = frequency_response([[1.0]], [[C]], [[1.0]], slider, frequencies=grid, **over)
+    system = System(([[1.0]], [[C]], [[1.0]]), slider, harmonics=(1,))
+    coarse = frequency_response(system, harmonic_force=[F], frequencies=grid)
     f = finer(grid, *linear_modes(coarse.balance, True))
     assert np.isin(grid, f).all() and len(f) <= points + 25
-    answer = frequency_response([[1.0]], [[C]], [[1.0]], slider, frequencies=f, **over)
+    answer = frequency_response(system, harmonic_force=[F], frequencies=f)
     zeta = C / (2.0 * np.sqrt(3.0))
     exact = 1e-3 / (2.0 * zeta * np.sqrt(1.0 - zeta**2))
     height = np.abs(measures.accelerance(answer, ROW, F))
@@ -72,7 +72,9 @@ def test_peak_outside_the_sweep_is_none_of_it() -> None:
     # less than a width beyond the mode: the flank falls over the whole sweep
     grid = np.linspace(f0 * (1.0 + 0.5 * C), 1.4 * f0, 20)
     answer = frequency_response(
-        [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
+        System(([[1.0]], [[C]], [[1.0]]), slider, harmonics=(1,)),
+        harmonic_force=[F],
+        frequencies=grid,
     )
     assert limit_of(answer, False).peaks("right", grid) == []
 

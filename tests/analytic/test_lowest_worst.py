@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
-from upd.hbm import contacts, frequency_response
+from upd.hbm import System, contacts, frequency_response
 from upd.reference.friction import jenkins_peak
 from upd.sizing import WorstPeak, lowest_worst
 from upd.sizing.worst_peak import BRANCH_STEP, CLOSE, Peaks, PeaksOver, reached
@@ -34,15 +34,14 @@ def closed(ratio: float) -> float:
 def solved_curve(s: float) -> Peaks:
     ratio = math.exp(s)
     answer = frequency_response(
-        [[1.0]],
-        [[0.0]],
-        [[1.0]],
-        contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=MU, preload=1.0),
+        System(
+            ([[1.0]], [[0.0]], [[1.0]]),
+            contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=MU, preload=1.0),
+            harmonics=(1,),
+            samples=512,
+        ),
         harmonic_force=[1.0 / ratio],
-        # peaks are between the frequencies of the free and of the stuck mass
         frequencies=np.linspace(0.98, 1.02 * math.sqrt(1.0 + K_T), 2000) / (2.0 * math.pi),
-        harmonics=(1,),
-        samples=512,
     )
     height = ratio * np.abs(answer.amplitude([1.0]))
     k = int(height.argmax())

@@ -18,13 +18,13 @@ from upd.hbm import (
     NonlinearMode,
     Path,
     PathProblem,
+    System,
     contacts,
     frequency_response,
     nonlinear_mode,
 )
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
-from upd.hbm.springs.response import GivenSystem
 from upd.reference.friction import jenkins_peak
 
 FloatArray = NDArray[np.float64]
@@ -43,7 +43,7 @@ EXACT = {
 def jenkins(amplitudes: Any, **options: Any) -> NonlinearMode:
     points = contacts([[0.0]], [[1.0]], **JENKINS)
     return nonlinear_mode(
-        [[1.0]], [[0.0]], [[1.0]], points, mode=1, amplitudes=amplitudes, **options
+        System(([[1.0]], [[0.0]], [[1.0]]), points, **options), mode=1, amplitudes=amplitudes
     )
 
 
@@ -93,7 +93,9 @@ def test_below_first_slip_it_is_the_stuck_mode() -> None:
 def test_viscous_damping_adds() -> None:
     points = contacts([[0.0]], [[1.0]], **JENKINS)
     mode = nonlinear_mode(
-        [[1.0]], [[0.02]], [[1.0]], points, mode=1, amplitudes=[0.5, 1.0], harmonics=(1, 3)
+        System(([[1.0]], [[0.02]], [[1.0]]), points, harmonics=(1, 3)),
+        mode=1,
+        amplitudes=[0.5, 1.0],
     )
     np.testing.assert_allclose(mode.damping * 2 * (2 * np.pi * mode.frequency), 0.02, rtol=1e-9)
 
@@ -122,8 +124,8 @@ def benchmark(mode: int, amplitudes: Any, **options: Any) -> NonlinearMode:
     normal = [[s, -c, 0, 0, -s, c], [0, 0, -s, -c, s, c]]
     tangent = [[[-c, -s, 0, 0, c, s], [0, 0, -c, s, c, -s]]]
     points = contacts(normal, tangent, k_n=3e5, k_t=3e5, mu=0.5)
-    given = {"static_force": STATIC, "harmonics": range(10)} | options
-    return nonlinear_mode(M, C, K, points, mode=mode, amplitudes=amplitudes, **given)
+    given: dict[str, Any] = {"static_force": STATIC, "harmonics": range(10)} | options
+    return nonlinear_mode(System((M, C, K), points, **given), mode=mode, amplitudes=amplitudes)
 
 
 @pytest.mark.parametrize(("mode", "start"), [*BENCHMARK])
@@ -210,7 +212,7 @@ def test_jacobian_by_differences(amplitude: float, states: set[int], proportiona
         preload=[1.0, 0.3],
     )
     static = np.array([0.1, 0.05])
-    given = GivenSystem(one, damping, K, points, static, None, None, range(4), 256, "zero", None)
+    given = System((one, damping, K), points, static, harmonics=range(4), samples=256)
     b = given.balance("nonlinear_mode", np.ones(1), None, fast_exits=False)
     stuck, omegas, number = stuck_modes(b, 1)
     extended = ExtendedBalance(b, stuck[:, number], float(omegas[number]))
@@ -251,10 +253,8 @@ def test_peak_of_one_degree_of_freedom_is_that_of_harmonic_balance() -> None:
     mode = jenkins(X_C * np.geomspace(1.01, 30.0, 20), harmonics=(1,), samples=2048)
     points = contacts([[0.0]], [[1.0]], **JENKINS)
     omega = np.linspace(0.953, 1.151, 100)
-    answer = frequency_response(
-        [[1.0]], [[0.0]], [[1.0]], points, harmonic_force=[force], frequencies=omega / (2 * np.pi),
-        harmonics=(1,), samples=2048,
-    )  # fmt: skip
+    system = System(([[1.0]], [[0.0]], [[1.0]]), points, harmonics=(1,), samples=2048)
+    answer = frequency_response(system, harmonic_force=[force], frequencies=omega / (2 * np.pi))
     # the mode's damping force grows with the frequency, that of friction does not
     assert mode.peak([force], [1.0])[1] == pytest.approx(answer.peak([1.0])[1], rel=5e-3)
 
@@ -266,14 +266,9 @@ def test_best_preload_is_the_closed_form() -> None:
     k_t, loads = 0.3, (0.6, 1.1)
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=1.0)
     mode = nonlinear_mode(
-        [[1.0]],
-        [[0.0]],
-        [[1.0]],
-        slider,
+        System(([[1.0]], [[0.0]], [[1.0]]), slider, harmonics=(1,), samples=2048),
         mode=1,
         amplitudes=np.geomspace(1.0, 80.0, 60),
-        harmonics=(1,),
-        samples=2048,
     )
     factor, worst = mode.best_preload([0.7], [1.0])
     assert worst == pytest.approx(0.7 * np.pi / k_t, rel=1e-3)
@@ -306,8 +301,10 @@ def test_best_preload_is_the_closed_form() -> None:
     ],
 )
 def test_faults(change: dict[str, Any], words: str) -> None:
-    given = {"mode": 1, "amplitudes": [1.0, 2.0]} | change
+    given: dict[str, Any] = {"mode": 1, "amplitudes": [1.0, 2.0]} | change
     with pytest.raises(InputError, match=words):
         law = JENKINS | {name: given.pop(name) for name in ("preload",) if name in given}
         points = contacts([[0.0]], [[1.0]], **law)
-        nonlinear_mode([[1.0]], [[0.0]], [[1.0]], points, **given)
+        names = ("harmonics", "static_force", "slider", "damper_rows")
+        own = {name: given.pop(name) for name in names if name in given}
+        nonlinear_mode(System(([[1.0]], [[0.0]], [[1.0]]), points, **own), **given)

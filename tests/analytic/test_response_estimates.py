@@ -33,7 +33,7 @@ from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.forced.varied import bound, estimate
 from upd.errors import ConvergenceError
-from upd.hbm import climb, contacts, frequency_response
+from upd.hbm import System, climb, contacts, frequency_response
 from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
@@ -386,13 +386,9 @@ def test_the_peak_of_an_acceleration_is_climbed_to() -> None:
     zeta = 0.1
     stuck = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1e-9, mu=1.0, preload=1.0)
     answer = frequency_response(
-        [[1.0]],
-        [[2.0 * zeta]],
-        [[1.0]],
-        stuck,
+        System(([[1.0]], [[2.0 * zeta]], [[1.0]]), stuck, harmonics=(1,)),
         harmonic_force=[1.0],
         frequencies=np.array([0.16]),
-        harmonics=(1,),
     )
     w = math.sqrt(1.0 - 2.0 * zeta**2)
     for power, expected in ((0, w), (2, 1.0 / w)):

@@ -12,9 +12,16 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, fsolve
 
 from upd.errors import InputError
-from upd.hbm import FrequencyResponse, Settings, contacts, frequency_response, harmonics, stability
+from upd.hbm import (
+    FrequencyResponse,
+    Settings,
+    System,
+    contacts,
+    frequency_response,
+    harmonics,
+    stability,
+)
 from upd.hbm.core.fourier import synthesis
-from upd.hbm.springs.response import GivenSystem
 from upd.hbm.springs.stability import changes, period_map
 
 FloatArray = NDArray[np.float64]
@@ -94,15 +101,15 @@ def softening() -> FrequencyResponse:
     below, above = np.linspace(1.2, 1.36, 40), np.linspace(1.3602, 1.45, 10)
     w = np.concatenate([below, np.linspace(1.36, 1.360098, 12)[1:], above])
     return frequency_response(
-        [[1.0]],
-        [[0.02]],
-        [[1.1]],
-        points,
+        System(
+            ([[1.0]], [[0.02]], [[1.1]]),
+            points,
+            static_force=[0.5],
+            harmonics=range(16),
+            samples=2048,
+        ),
         harmonic_force=[0.15],
-        static_force=[0.5],
         frequencies=w / (2 * np.pi),
-        harmonics=range(16),
-        samples=2048,
         sweep_down=True,
         settings=Settings(largest_step=0.02),
     )
@@ -146,12 +153,8 @@ def test_a_pair_is_complex_before_the_fold(softening: FrequencyResponse) -> None
 def test_a_slider_that_sticks_is_left_out_and_one_that_slips_forgets() -> None:
     def answered(limit: float) -> Any:
         slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=limit)
-        return stability(
-            frequency_response(
-                [[1.0]], [[0.02]], [[1.0]], slider,
-                harmonic_force=[0.3], frequencies=[0.18], harmonics=(1, 3, 5),
-            )
-        )  # fmt: skip
+        system = System(([[1.0]], [[0.02]], [[1.0]]), slider, harmonics=(1, 3, 5))
+        return stability(frequency_response(system, harmonic_force=[0.3], frequencies=[0.18]))
 
     stuck, slips = answered(100.0), answered(0.2)
     assert len(stuck.multipliers[0]) == 2
@@ -208,9 +211,7 @@ def test_friction_along_two_directions_is_what_differences_of_marched_periods_gi
     points = contacts(
         [[1.0, 0, 0]], [[[0, 1.0, 0]], [[0, 0, 1.0]]], k_n=k_n, k_t=k_t, mu=mu, preload=preload
     )
-    given = GivenSystem(
-        np.eye(3), np.diag(zeta), K, points, None, None, None, (0, 1), None, "zero", None
-    )
+    given = System((np.eye(3), np.diag(zeta), K), points)
     b = given.balance("stability", np.ones(1), None, fast_exits=True)
     found = period_map(values, zeta, Psi, changes(b, ws[None], fs[None]), dt)
     h = 1e-6

@@ -24,7 +24,7 @@ from upd.analyses.forced.statics import (
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.contact.rigid_damper import equilibrium
 from upd.errors import InputError
-from upd.hbm import contacts, frequency_response
+from upd.hbm import System, contacts, frequency_response
 from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages
 from upd.scene import load_scene
@@ -215,15 +215,11 @@ def oscillator(mu_N: float, T_0: float, F: float, f: float, **options: Any) -> A
     """m = k = 1 with a Jenkins element that carries T_0 at rest, held there by a static force."""
     jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=mu_N)
     return frequency_response(
-        [[1.0]],
-        [[0.02]],
-        [[1.0]],
-        jenkins,
+        System(
+            ([[1.0]], [[0.02]], [[1.0]]), jenkins, static_force=[T_0], slider=[[-T_0]], **options
+        ),
         harmonic_force=[F],
         frequencies=[f],
-        static_force=[T_0],
-        slider=[[-T_0]],
-        **options,
     )
 
 
@@ -248,13 +244,13 @@ def test_stuck_around_the_static_traction_is_linear() -> None:
 def test_sliders_of_another_number_of_points_are_refused() -> None:
     with pytest.raises(InputError, match=r"slider has shape.*every tangent, \(1, 1\)"):
         frequency_response(
-            [[1.0]],
-            [[0.02]],
-            [[1.0]],
-            contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=1.0),
+            System(
+                ([[1.0]], [[0.02]], [[1.0]]),
+                contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=1.0),
+                slider=[[0.0, 0.0]],
+            ),
             harmonic_force=[0.3],
             frequencies=[0.1],
-            slider=[[0.0, 0.0]],
         )
 
 

@@ -14,6 +14,7 @@ import pytest
 from upd.errors import InputError
 from upd.hbm import (
     FrequencyResponse,
+    System,
     all_sectors,
     contacts,
     frequency_response,
@@ -51,8 +52,13 @@ def chain(**changed: Any) -> FrequencyResponse:
         "w": 1.04,
     } | changed
     w = given.pop("w")
+    own = {
+        name: given.pop(name) for name in ("harmonics", "samples", "static_force") if name in given
+    }
     return travelling_wave_response(
-        given.pop("sectors"), given.pop("contacts"), frequencies=[w / (2.0 * np.pi)], **given
+        System(given.pop("sectors"), given.pop("contacts"), **own),
+        frequencies=[w / (2.0 * np.pi)],
+        **given,
     )
 
 
@@ -99,14 +105,16 @@ def varying(order: int, w: float, highest: int, samples: int = 2048) -> Frequenc
         [[1.0, 0.0, -1.0, 0.0]], [[0.0, -1.0, 0.0, 1.0]], k_n=0.3, k_t=0.2, mu=0.3, preload=0.3
     )
     return travelling_wave_response(
-        {d: (np.eye(2), 0.01 * np.eye(2), K) for d in range(7)},
-        point,
+        System(
+            {d: (np.eye(2), 0.01 * np.eye(2), K) for d in range(7)},
+            point,
+            harmonics=range(highest + 1),
+            samples=samples,
+        ),
         n_sectors=N,
         engine_order=order,
         harmonic_force=[0.2, 0.2],
         frequencies=[w / (2.0 * np.pi)],
-        harmonics=range(highest + 1),
-        samples=samples,
     )
 
 
@@ -143,10 +151,14 @@ def wedge(load: float, highest: int, frequencies: Any, **changed: Any) -> Freque
         "damper_rows": np.array([[[0.0], [1.0]]] * 2),
         "harmonics": range(1, highest + 1),
         "samples": 1024,
-        "harmonic_force": [1.0],
     } | changed
+    force = given.pop("harmonic_force", [1.0])
     return travelling_wave_response(
-        disk, points, n_sectors=N, engine_order=3, frequencies=frequencies, **given
+        System(disk, points, **given),
+        n_sectors=N,
+        engine_order=3,
+        harmonic_force=force,
+        frequencies=frequencies,
     )
 
 
@@ -204,14 +216,11 @@ def test_damper_of_the_other_sector_and_other_numbering() -> None:
             np.zeros((2, 4)), rows, k_n=0.0, k_t=1.5e6, mu=0.4, preload=20.0 / np.sqrt(2.0)
         )
         answer = travelling_wave_response(
-            disk,
-            points,
+            System(disk, points, harmonics=range(1, 6), samples=1024),
             n_sectors=N,
             engine_order=3,
             harmonic_force=[1.0, 0.0],
             frequencies=[375.0],
-            harmonics=range(1, 6),
-            samples=1024,
         )
         assert answer.amplitude([1.0, 0.0])[0] == pytest.approx(want, rel=1e-12)
 
@@ -234,21 +243,21 @@ def test_standing_waves_are_real() -> None:
         # one blade with its damper between walls that move alike, or against each other
         K = 4e6 + springs(order, 1e5)
         alone = frequency_response(
-            np.diag([1.0, 0.02]),
-            np.diag([8.0, 0.0]),
-            np.diag([K, 0.0]),
-            contacts(
-                np.zeros((2, 2)),
-                [[-1.0, 1.0], [-far, 1.0]],
-                k_n=0.0,
-                k_t=1.5e6,
-                mu=0.4,
-                preload=20.0 / np.sqrt(2.0),
+            System(
+                (np.diag([1.0, 0.02]), np.diag([8.0, 0.0]), np.diag([K, 0.0])),
+                contacts(
+                    np.zeros((2, 2)),
+                    [[-1.0, 1.0], [-far, 1.0]],
+                    k_n=0.0,
+                    k_t=1.5e6,
+                    mu=0.4,
+                    preload=20.0 / np.sqrt(2.0),
+                ),
+                harmonics=(1, 3),
+                samples=1024,
             ),
             harmonic_force=[1.0, 0.0],
             frequencies=[322.0],
-            harmonics=(1, 3),
-            samples=1024,
         )
         want = alone.amplitude([1.0, 0.0])[0]
         assert answer.amplitude([1.0, 0.0])[0] == pytest.approx(want, rel=1e-9)
@@ -258,23 +267,25 @@ def wedge_order(order: int) -> FrequencyResponse:
     """The wedge of another engine order, odd harmonics only."""
     disk = {d: ([[1.0]], [[8.0]], [[4e6 + springs(d, 1e5)]]) for d in {0, order}}
     return travelling_wave_response(
-        disk,
-        contacts(
-            np.zeros((2, 2)),
-            [[-1.0, 0.0], [0.0, -1.0]],
-            k_n=0.0,
-            k_t=1.5e6,
-            mu=0.4,
-            preload=20.0 / np.sqrt(2.0),
+        System(
+            disk,
+            contacts(
+                np.zeros((2, 2)),
+                [[-1.0, 0.0], [0.0, -1.0]],
+                k_n=0.0,
+                k_t=1.5e6,
+                mu=0.4,
+                preload=20.0 / np.sqrt(2.0),
+            ),
+            harmonics=(1, 3),
+            samples=1024,
+            damper=rigid_damper(0.02, [1.0, 1.0, 1.0], [0, 0, 0], [0, 0, 0], kept=(1,)),
+            damper_rows=np.array([[[0.0], [1.0]]] * 2),
         ),
         n_sectors=N,
         engine_order=order,
         harmonic_force=[1.0],
         frequencies=[322.0],
-        harmonics=(1, 3),
-        samples=1024,
-        damper=rigid_damper(0.02, [1.0, 1.0, 1.0], [0, 0, 0], [0, 0, 0], kept=(1,)),
-        damper_rows=np.array([[[0.0], [1.0]]] * 2),
     )
 
 
@@ -307,16 +318,18 @@ def random_disk(seed: int, proportional: bool) -> FrequencyResponse:
         preload=0.6,
     )
     return travelling_wave_response(
-        disk,
-        points,
+        System(
+            disk,
+            points,
+            harmonics=(0, 1, 2, 3),
+            samples=11 * N,
+            damper=rigid_damper(0.3, [0.1, 0.2, 0.3], [0, 0, 0], [0.0, 0.0, 1.0], kept=(0, 1, 2)),
+            damper_rows=body,
+        ),
         n_sectors=N,
         engine_order=2,
         harmonic_force=[0.05, 0.02j, 0.0, 0.01],
         frequencies=[0.2],
-        harmonics=(0, 1, 2, 3),
-        samples=11 * N,
-        damper=rigid_damper(0.3, [0.1, 0.2, 0.3], [0, 0, 0], [0.0, 0.0, 1.0], kept=(0, 1, 2)),
-        damper_rows=body,
     )
 
 

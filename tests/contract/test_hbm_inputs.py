@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from upd.errors import InputError
 from upd.hbm import (
     FrequencyResponse,
+    System,
     contact_rows,
     contacts,
     frequency_response,
@@ -25,8 +26,10 @@ JENKINS = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)
 
 def oscillator(**options: Any) -> FrequencyResponse:
     given: dict[str, Any] = {"harmonic_force": [0.3], "frequencies": [0.18]} | options
-    matrices = [given.pop(name, value) for name, value in _MATRICES.items()]
-    return frequency_response(*matrices, given.pop("contacts", JENKINS), **given)
+    matrices: Any = [given.pop(name, value) for name, value in _MATRICES.items()]
+    names = ("static_force", "damper", "damper_rows", "harmonics", "samples", "start", "slider")
+    own = {name: given.pop(name) for name in names if name in given}
+    return frequency_response(System(matrices, given.pop("contacts", JENKINS), **own), **given)
 
 
 _MATRICES: dict[str, Any] = {"M": [[1.0]], "C": [[0.02]], "K": [[1.0]]}
@@ -122,13 +125,9 @@ def test_points_that_are_not_periodic_are_counted() -> None:
         [[0.0, 0.0]], [[[1.0, 0.0]], [[0.0, 1.0]]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5
     )
     answer = frequency_response(
-        np.eye(2),
-        0.05 * np.eye(2),
-        np.diag([1.0, 1.2]),
-        points,
+        System((np.eye(2), 0.05 * np.eye(2), np.diag([1.0, 1.2])), points, harmonics=(0, 1, 2, 3)),
         harmonic_force=[0.3, 0.29j],
         frequencies=np.linspace(0.10, 0.30, 81),
-        harmonics=(0, 1, 2, 3),
     )
     assert len(answer.periodic) == len(answer.frequency)
     astray = int((~answer.periodic).sum())
@@ -152,10 +151,7 @@ def test_damping_that_feeds_energy_is_refused(mu: float) -> None:
     for C in (-0.05 * np.eye(2), [[0.05, 0.2], [0.2, 0.05]]):
         with pytest.raises(InputError, match="C feeds energy into a motion"):
             frequency_response(
-                np.eye(2),
-                C,
-                np.eye(2),
-                joint,
+                System((np.eye(2), C, np.eye(2)), joint),
                 harmonic_force=[1.0, 0.0],
                 frequencies=[0.1, 0.2],
             )
@@ -165,10 +161,7 @@ def test_no_damping_at_a_resonance_is_refused() -> None:
     joint = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=3.0, mu=1.0, preload=1e9)
     with pytest.raises(InputError, match="no damping at a resonance of the sticking contacts"):
         frequency_response(
-            [[1.0]],
-            [[0.0]],
-            [[1.0]],
-            joint,
+            System(([[1.0]], [[0.0]], [[1.0]]), joint),
             harmonic_force=[1.0],
             frequencies=[2.0 / (2.0 * np.pi)],
         )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from upd.contact import normal_contact, tangential_contact, tilted_contact
-from upd.hbm import contacts, frequency_response
+from upd.hbm import System, contacts, frequency_response
 from upd.labels import Shown
 from upd.reference import half_space_compliance
 
@@ -43,10 +43,11 @@ def test_what_is_printed() -> None:
         tilted_contact(C, np.zeros(400), arms, load=100.0),
         slider,
         frequency_response(
-            np.eye(1), 0.02 * np.eye(1), np.eye(1), slider,
-            harmonic_force=[0.3], frequencies=np.linspace(0.15, 0.3, 16), harmonics=(1, 3),
+            System((np.eye(1), 0.02 * np.eye(1), np.eye(1)), slider, harmonics=(1, 3)),
+            harmonic_force=[0.3],
+            frequencies=np.linspace(0.15, 0.3, 16),
         ),
-    )  # fmt: skip
+    )
     for one in results:
         assert len(repr(one).splitlines()) <= 10
         assert len(repr(one)) < 1000

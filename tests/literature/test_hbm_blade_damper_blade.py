@@ -12,11 +12,12 @@ equations, from an independent implementation. Units SI (the solver only needs c
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response, stability
+from upd.hbm import Contacts, FrequencyResponse, System, contacts, frequency_response, stability
 from upd.hbm.springs.modal import modal
 from upd.hbm.springs.time_integration import steady_state
 
@@ -40,18 +41,16 @@ def wedge() -> Contacts:
     return contacts(normal, tangent, k_n=3e5, k_t=3e5, mu=0.5)
 
 
-def response(
-    frequencies: object, points: Contacts | None = None, **options: object
-) -> FrequencyResponse:
+def response(frequencies: Any, points: Contacts | None = None, **options: Any) -> FrequencyResponse:
     return frequency_response(
-        M,
-        C,
-        stiffness(),
-        wedge() if points is None else points,
-        static_force=[0, 0, 0, 0, 0, 120.0],
+        System(
+            (M, C, stiffness()),
+            wedge() if points is None else points,
+            static_force=[0, 0, 0, 0, 0, 120.0],
+            **options,
+        ),
         harmonic_force=-1j * np.array([0, -20, 5, 0, 0, 0]),
         frequencies=frequencies,
-        **options,  # type: ignore[arg-type]
     )
 
 
@@ -157,14 +156,11 @@ def test_the_printed_curve_has_a_stretch_that_oscillates_and_its_peak_is_stable(
 
 def test_five_times_the_load_folds() -> None:
     path = frequency_response(
-        M,
-        C,
-        stiffness(),
-        wedge(),
-        static_force=[0, 0, 0, 0, 0, 120.0],
+        System(
+            (M, C, stiffness()), wedge(), static_force=[0, 0, 0, 0, 0, 120.0], harmonics=range(10)
+        ),
         harmonic_force=-5j * np.array([0, -20, 5, 0, 0, 0]),
         frequencies=np.linspace(140.0, 156.0, 81),
-        harmonics=range(10),
     )
     y2, f = path.amplitude(Y2), path.frequency
     turns = np.flatnonzero(np.diff(np.sign(np.diff(f)))) + 1

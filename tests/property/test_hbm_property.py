@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.whole_balance import evaluate, harmonic_force
-from upd.hbm import contacts, frequency_response, harmonics
+from upd.hbm import System, contacts, frequency_response, harmonics
 from upd.hbm.core.fourier import analysis, embed, synthesis
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
@@ -178,11 +178,7 @@ def test_loads_times_s_give_the_answer_times_s(exponent: float) -> None:
     grid = np.linspace(0.10, 0.22, 13)
     one, other = (
         frequency_response(
-            M,
-            C,
-            K,
-            points,
-            static_force=f * np.array([0, 0, 2.0]),
+            System((M, C, K), points, static_force=f * np.array([0, 0, 2.0])),
             harmonic_force=f * np.array([1.0, 0.3, 0]),
             frequencies=grid,
         )

@@ -5,6 +5,8 @@ Stiff contacts, gross slip, folds, no damping, few and many samples and harmonic
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from upd.hbm import (
     FrequencyResponse,
     PathProblem,
     Settings,
+    System,
     contacts,
     follow,
     frequency_response,
@@ -30,11 +33,12 @@ def jenkins(limit: float, k_t: float) -> Contacts:
 
 
 def oscillator(
-    points: Contacts, w: np.ndarray, *, c: float = 0.02, load: float = 1.0, **options: object
+    points: Contacts, w: np.ndarray, *, c: float = 0.02, load: float = 1.0, **options: Any
 ) -> FrequencyResponse:
-    return frequency_response(
-        [[1.0]], [[c]], [[1.0]], points, harmonic_force=[load], frequencies=w * HZ, **options
-    )  # type: ignore[arg-type]
+    names = ("sweep_down", "settings", "fast_exits")
+    path = {name: options.pop(name) for name in names if name in options}
+    system = System(([[1.0]], [[c]], [[1.0]]), points, **options)
+    return frequency_response(system, harmonic_force=[load], frequencies=w * HZ, **path)
 
 
 @pytest.mark.parametrize("k_t", [1.0, 1e2, 1e4, 1e6])
@@ -95,15 +99,18 @@ def test_low_frequency_stick_slip_against_time() -> None:
     assert marched.amplitude(np.ones(1)) == pytest.approx(answer.amplitude([1.0])[0], rel=5e-3)
 
 
-def gap_oscillator(w: np.ndarray, **options: object) -> FrequencyResponse:
+def gap_oscillator(w: np.ndarray, *, sweep_down: bool = False, **options: Any) -> FrequencyResponse:
     """A mass pressed on a stiff unilateral spring.
 
     It lifts off near resonance and the peak leans to lower frequencies.
     """
     points = contacts([[1.0]], (), k_n=1.0, k_t=1.0, mu=0.0, preload=1.0)
     return frequency_response(
-        [[1.0]], [[0.03]], [[0.5]], points, harmonic_force=[0.12], frequencies=w * HZ, **options
-    )  # type: ignore[arg-type]
+        System(([[1.0]], [[0.03]], [[0.5]]), points, **options),
+        harmonic_force=[0.12],
+        frequencies=w * HZ,
+        sweep_down=sweep_down,
+    )
 
 
 def test_fold_with_lift_off() -> None:
@@ -136,7 +143,9 @@ def test_badly_scaled_units(unit: float) -> None:
     one = oscillator(jenkins(0.8, 1.0), w)
     points = jenkins(0.8 * unit, unit)
     other = frequency_response(
-        [[unit]], [[0.02 * unit]], [[unit]], points, harmonic_force=[unit], frequencies=w * HZ
+        System(([[unit]], [[0.02 * unit]], [[unit]]), points),
+        harmonic_force=[unit],
+        frequencies=w * HZ,
     )
     assert other.peak([1.0])[1] == pytest.approx(one.peak([1.0])[1], rel=1e-8)
 
@@ -203,10 +212,7 @@ def test_body_that_nothing_presses_with_unequal_gaps() -> None:
     for K in (np.eye(1), np.zeros((1, 1))):
         points = contacts([[1.0], [-1.0]], k_n=5.0, mu=0.0, gap=[3.0, 1e3])
         answer = frequency_response(
-            np.eye(1),
-            0.1 * np.eye(1),
-            K,
-            points,
+            System((np.eye(1), 0.1 * np.eye(1), K), points),
             harmonic_force=[0.1],
             frequencies=np.linspace(0.8, 1.2, 11) * HZ,
         )
@@ -225,14 +231,9 @@ def test_released_from_stuck_is_a_solution_wherever_the_sliders_start(start: Sta
     # the slider is 0.8 away from rest and holds the mass there; pressed hard enough, it sticks
     points = contacts([[1.0]], [[0.5]], k_n=2.0, k_t=1.0, mu=0.8, preload=1.0)
     b = frequency_response(
-        [[1.0]],
-        [[0.05]],
-        [[1.0]],
-        points,
-        static_force=[3.0],
+        System(([[1.0]], [[0.05]], [[1.0]]), points, static_force=[3.0], harmonics=(0, 1, 2, 3)),
         harmonic_force=[0.2],
         frequencies=[0.2],
-        harmonics=(0, 1, 2, 3),
     ).balance
     b = b.with_sliders(start, np.array([[0.8, 0.0]]) if start in ("zero", "static") else None)
     for problem in (b, b.pressed(np.array([50.0]))):

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm import FrequencyResponse, System, contacts, frequency_response
 
 
 def opening(harmonics: tuple[int, ...]) -> FrequencyResponse:
     return frequency_response(
-        [[1.0]],
-        [[0.02]],
-        [[1.0]],
-        contacts([[1.0]], [[0.0]], k_n=2.0, k_t=1.0, mu=0.0, preload=0.05),
+        System(
+            ([[1.0]], [[0.02]], [[1.0]]),
+            contacts([[1.0]], [[0.0]], k_n=2.0, k_t=1.0, mu=0.0, preload=0.05),
+            harmonics=harmonics,
+        ),
         harmonic_force=[0.3],
         frequencies=np.array([0.16, 0.18]),
-        harmonics=harmonics,
     )
 
 
@@ -39,13 +39,13 @@ def test_a_mean_force_on_a_body_without_stiffness_moves_it_against_the_contact()
     """Nothing but the contact, closed, holds it: mean force over k_n, relative to the amplitude."""
     k_n, preload = 2.0, 0.05
     held = frequency_response(
-        [[1.0]],
-        [[0.02]],
-        [[0.0]],
-        contacts([[1.0]], [[0.0]], k_n=k_n, k_t=1.0, mu=0.0, preload=preload),
+        System(
+            ([[1.0]], [[0.02]], [[0.0]]),
+            contacts([[1.0]], [[0.0]], k_n=k_n, k_t=1.0, mu=0.0, preload=preload),
+            harmonics=(1,),
+        ),
         harmonic_force=[0.3],
         frequencies=np.array([0.1, 0.12]),
-        harmonics=(1,),
     )
     amplitude = abs(held.amplitude([1.0])[-1])
     w = amplitude * np.cos(np.linspace(0.0, 2.0 * np.pi, 4096, endpoint=False))

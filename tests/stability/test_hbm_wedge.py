@@ -5,6 +5,8 @@ Rocking, lift-off, limits of little and much load.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigh
@@ -13,6 +15,7 @@ from upd.hbm import (
     Contacts,
     FrequencyResponse,
     Settings,
+    System,
     contact_rows,
     contacts,
     frequency_response,
@@ -63,7 +66,9 @@ def wedge(
     k_n: float = 1.56e6,
     frequencies: np.ndarray = BAND,
     cf: float = CF,
-    **options: object,
+    fast_exits: bool = True,
+    settings: Settings | None = None,
+    **options: Any,
 ) -> FrequencyResponse:
     """Response to a force on the right platform.
 
@@ -89,16 +94,18 @@ def wedge(
         7.2e-5, [1.1e-2, 3.5e-3, 1.3e-2], [0, 0, -1.0], [0, 0, cf], kept=(0, 2, 4)
     )
     return frequency_response(
-        M,
-        C,
-        K,
-        points,
+        System(
+            (M, C, K),
+            points,
+            static_force=place(points, N0),
+            damper=damper,
+            damper_rows=contact_rows(damper, where, np.array(frame)),
+            **options,
+        ),
         harmonic_force=load * OUT,
-        static_force=place(points, N0),
         frequencies=frequencies,
-        damper=damper,
-        damper_rows=contact_rows(damper, where, np.array(frame)),
-        **options,  # type: ignore[arg-type]
+        fast_exits=fast_exits,
+        settings=settings,
     )
 
 

@@ -3,12 +3,11 @@
 Multi-harmonic balance, continuation, time-march cross-check.
 
 >>> import numpy as np
->>> from upd.hbm import contacts, frequency_response
+>>> from upd.hbm import System, contacts, frequency_response
 >>> slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)  # Jenkins, to ground
->>> answer = frequency_response(
-...     np.eye(1), 0.02 * np.eye(1), np.eye(1), slider,
-...     harmonic_force=[0.3], frequencies=np.linspace(0.15, 0.3, 16), harmonics=(1, 3),
-... )
+>>> system = System((np.eye(1), 0.02 * np.eye(1), np.eye(1)), slider, harmonics=(1, 3))
+>>> f = np.linspace(0.15, 0.3, 16)
+>>> answer = frequency_response(system, harmonic_force=[0.3], frequencies=f)
 >>> answer.status
 'complete'
 >>> bool(answer.amplitude([1.0]).max() < answer.stuck([1.0], np.linspace(0.15, 0.3, 151)).max())
@@ -22,7 +21,7 @@ from upd.hbm.springs.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.springs.nonlinear_mode import NonlinearMode, nonlinear_mode
 from upd.hbm.springs.peak import Peak, climb
 from upd.hbm.springs.points import Contacts, Law, contacts
-from upd.hbm.springs.response import FrequencyResponse, frequency_response
+from upd.hbm.springs.response import FrequencyResponse, System, frequency_response
 from upd.hbm.springs.stability import Stability, stability
 from upd.hbm.springs.time_integration import SteadyState, steady_state
 from upd.hbm.springs.waves import (
@@ -47,6 +46,7 @@ __all__ = [
     "Stability",
     "State",
     "SteadyState",
+    "System",
     "WaveInTime",
     "all_sectors",
     "climb",

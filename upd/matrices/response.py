@@ -232,6 +232,7 @@ def forced_response(
         settings.pop(name, None) for name in ("C", "zeta", "dofs", "static_force", "modes")
     )
     harmonics = settings.pop("harmonics", (0, 1))
+    own = {name: settings.pop(name) for name in ("samples", "start", "slider") if name in settings}
     model, damping = _read(K, M, C, zeta, dofs)
     n = model.K.shape[0]
     orders = hbm.harmonics(harmonics).numbers
@@ -264,14 +265,15 @@ def forced_response(
     at = np.eye(n)[rows.used] if reduced is None else reduced.at(rows.used)
     points = _contacts(joints, rows.matrix(closing) @ at, [rows.matrix(s) @ at for s in sliding])
     answer = hbm.frequency_response(
-        Md,
-        _damping(Kd, Md, damping, zeta, reduced),
-        Kd,
-        points,
-        static_force=(rows.matrix([constant]) @ at)[0],
+        hbm.System(
+            (Md, _damping(Kd, Md, damping, zeta, reduced), Kd),
+            points,
+            static_force=(rows.matrix([constant]) @ at)[0],
+            harmonics=orders,
+            **own,
+        ),
         harmonic_force=(rows.matrix([harmonic], complex) @ at)[0],
         frequencies=f,
-        harmonics=orders,
         **settings,
     )
     if answer.status == "stopped":

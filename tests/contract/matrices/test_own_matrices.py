@@ -55,7 +55,9 @@ def in_memory(model: Matrices, C: Array) -> hbm.FrequencyResponse:
     push[2 * (ELEMENTS // 2 - 1)] = 20.0
     points = hbm.contacts(np.zeros((1, n)), slide, k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)
     return hbm.frequency_response(
-        model.M, C, model.K, points, harmonic_force=push, frequencies=FREQUENCIES, harmonics=(1, 3)
+        hbm.System((model.M, C, model.K), points, harmonics=(1, 3)),
+        harmonic_force=push,
+        frequencies=FREQUENCIES,
     )
 
 

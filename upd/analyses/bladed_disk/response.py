@@ -21,6 +21,7 @@ from upd.hbm import (
     Contacts,
     FrequencyResponse,
     RigidDamper,
+    System,
     contact_rows,
     contacts,
     rigid_damper,
@@ -156,17 +157,19 @@ def wave_response(
     one = next(iter(sectors.values()))
     points, damper, rows = gap_of(one, wedge, f_c)
     return travelling_wave_response(
-        {n: (s.M, s.C, s.K) for n, s in sectors.items()},
-        points,
+        System(
+            {n: (s.M, s.C, s.K) for n, s in sectors.items()},
+            points,
+            harmonics=harmonics,
+            samples=samples,
+            damper=damper,
+            damper_rows=rows,
+            start="frictionless",
+        ),
         n_sectors=one.n_sectors,
         engine_order=engine_order,
         harmonic_force=force,
         frequencies=frequencies,
-        harmonics=harmonics,
-        samples=samples,
-        damper=damper,
-        damper_rows=rows,
-        start="frictionless",
     )
 
 

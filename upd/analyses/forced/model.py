@@ -29,7 +29,7 @@ from upd.hbm import (
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.damper import attach
 from upd.hbm.springs.points import Start, stuck_stiffness
-from upd.hbm.springs.response import GivenSystem, response_of
+from upd.hbm.springs.response import System, response_of
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, FaceStiffness, Side
@@ -119,10 +119,11 @@ class Model:
         return -self.traction / law.k_t[:, None] if np.any(law.mu) else None
 
     @property
-    def system(self) -> dict[str, Any]:
-        """What `upd.hbm` takes of it, the excitation aside."""
-        own = ("M", "C", "K", "contacts", "damper", "damper_rows", "slider")
-        return {name: getattr(self, name) for name in own} | {"static_force": self.static}
+    def system(self) -> System:
+        """What `upd.hbm` takes of it, the excitation and the balance aside."""
+        own = ("contacts", "damper", "damper_rows", "slider")
+        given = {name: getattr(self, name) for name in own}
+        return System((self.M, self.C, self.K), static_force=self.static, **given)
 
     def linear(self, stuck: bool) -> tuple[Array, Array, Array, Array]:
         """M, C, K (n, n) of blades and damper and rows B of the points, without contacts or with
@@ -342,8 +343,8 @@ def balance_of(
         Per period, and of the sliders; those of the scene when None.
     """
     b = plan.scene.balance
-    given = GivenSystem(
-        **model.system,
+    given = replace(
+        model.system,
         harmonics=plan.scene.harmonic_numbers if harmonics is None else harmonics,
         samples=samples or (None if b.samples == "auto" else b.samples),
         start=start or b.slider,

@@ -318,12 +318,9 @@ def mode_over_amplitude(
     first = first_slip(b, shapes[:, k], float(omega[k]))
     rigid = int((values <= len(values) * np.finfo(float).eps * values[-1]).sum())
     found = nonlinear_mode(
-        **model.system,
+        replace(model.system, harmonics=numbers, samples=b.samples, start=scene.balance.slider),
         mode=k - rigid + 1,
         amplitudes=first * np.geomspace(*SPAN, POINTS),
-        harmonics=numbers,
-        samples=b.samples,
-        start=scene.balance.slider,
         settings=replace(LONG_STEPS, most_points=MOST_MODE_POINTS),
     )
     square = (2.0 * np.pi * found.frequency) ** 2

@@ -16,7 +16,6 @@ concept, Computers and Structures 154 (2015) 59.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,15 +25,12 @@ from scipy.linalg import eigh
 
 from upd.errors import InputError
 from upd.hbm.core.continuation import Path, follow
-from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.core.newton import PathProblem, Settings
-from upd.hbm.springs import response
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
-from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
-from upd.hbm.springs.points import Contacts, Start
+from upd.hbm.springs.response import System, parabola
 from upd.hbm.springs.sweep import FREQUENCY_SHARE, scale_of
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
@@ -109,7 +105,7 @@ class NonlinearMode(Shown):
         """
         k, log_a = int(np.argmax(self.damping)), np.log(self.amplitude)
         near = slice(max(k - 1, 0), k + 2)
-        at, zeta = response.parabola(log_a[near], self.damping[near])
+        at, zeta = parabola(log_a[near], self.damping[near])
         order = np.argsort(log_a[near])
         found = np.interp(at, log_a[near][order], self.frequency[near][order])
         return zeta, float(np.exp(at)), float(found)
@@ -243,39 +239,20 @@ class NonlinearMode(Shown):
 
 
 def nonlinear_mode(
-    M: ArrayLike,
-    C: ArrayLike,
-    K: ArrayLike,
-    contacts: Contacts,
-    *,
-    mode: int,
-    amplitudes: ArrayLike,
-    harmonics: Iterable[int] = range(10),
-    static_force: ArrayLike | None = None,
-    damper: RigidDamper | None = None,
-    damper_rows: FloatArray | None = None,
-    samples: int | None = None,
-    start: Start = "zero",
-    slider: ArrayLike | None = None,
-    settings: Settings | None = None,
+    system: System, *, mode: int, amplitudes: ArrayLike, settings: Settings | None = None
 ) -> NonlinearMode:
     """A mode of M q'' + C q' + K q = f_0 - B'f_c over its amplitude.
 
     Parameters
     ----------
-    M, C, K : (n, n) array_like
-        As in `upd.hbm.frequency_response`.
-    contacts : Contacts
+    system : System
+        With harmonic 1, and 0 where static loads act. One harmonic does not do under lift-off.
     mode : int
         Number of the mode with all points closed and sticking, 1 the lowest with a frequency.
     amplitudes : (k,) array_like
         Rising, above 0 [t^(1/2) mm]: answered at these and between.
-    harmonics : iterable of int
-        With 1, and with 0 where static loads act. One harmonic does not do under lift-off.
-    static_force : (n,) array_like, optional
-        [N]
-    damper, damper_rows, samples, start, slider, settings
-        As in `upd.hbm.frequency_response`.
+    settings : Settings, optional
+        Step control of the continuation.
 
     Returns
     -------
@@ -293,28 +270,24 @@ def nonlinear_mode(
     twice that amplitude.
 
     >>> import numpy as np
-    >>> from upd.hbm import contacts, nonlinear_mode
+    >>> from upd.hbm import System, contacts, nonlinear_mode
     >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=0.25, mu=1.0, preload=1.0)
-    >>> mode = nonlinear_mode(
-    ...     [[1.0]], [[0.0]], [[1.0]], jenkins, mode=1, amplitudes=[2.0, 8.0], harmonics=(1,)
-    ... )
+    >>> system = System(([[1.0]], [[0.0]], [[1.0]]), jenkins, harmonics=(1,))
+    >>> mode = nonlinear_mode(system, mode=1, amplitudes=[2.0, 8.0])
     >>> round(float(2 * np.pi * mode.frequency[-1]), 4), round(float(mode.damping[-1]), 4)
     (1.0607, 0.0354)
     """
-    a, h = np.asarray(amplitudes, dtype=float).ravel(), harmonics_of(harmonics)
+    a, h = np.asarray(amplitudes, dtype=float).ravel(), system.balanced(range(10))
     problems = []
     if not (len(a) and np.isfinite(a).all() and (a > 0.0).all() and (np.diff(a) > 0.0).all()):
         problems.append("amplitudes must be finite, above 0 and rising")
     if 1 not in h.numbers:
         problems.append(f"harmonics {h.numbers} lack 1, the mode's own")
-    if (contacts.law.preload < 0.0).any():
+    if (system.contacts.law.preload < 0.0).any():
         problems.append("a preload is negative")
     if problems:
         raise InputError(f"nonlinear_mode: {'; '.join(problems)}")
-    rows = (damper, damper_rows)
-    given = response.GivenSystem(
-        M, C, K, contacts, static_force, *rows, h.numbers, samples, start, slider
-    )
+    given = replace(system, harmonics=h.numbers)
     b = given.balance("nonlinear_mode", np.ones(1), None, fast_exits=False)
     with threads_for(b.size):
         return _along(b, mode, np.log(a), settings or Settings())

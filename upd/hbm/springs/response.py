@@ -9,7 +9,7 @@ import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple, cast, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,14 @@ from upd.hbm.springs.modal import modal
 from upd.hbm.springs.peak import climb
 from upd.hbm.springs.points import Contacts, Start
 from upd.hbm.springs.sweep import Curve, solve_curve
+from upd.labels import Shown
 from upd.linalg.parallel import threads_for
 
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+Matrices = tuple[ArrayLike, ArrayLike, ArrayLike]
 EPS = float(np.finfo(float).eps)
 #: largest contact motion that omitted harmonics may cause before a warning, relative
 TRUNCATION = 1e-2
@@ -273,182 +275,50 @@ def parabola(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     return float(x[i]), float(y[i])
 
 
-def frequency_response(
-    M: ArrayLike,
-    C: ArrayLike,
-    K: ArrayLike,
-    contacts: Contacts,
-    *,
-    harmonic_force: ArrayLike | Mapping[int, ArrayLike],
-    frequencies: ArrayLike,
-    static_force: ArrayLike | None = None,
-    harmonics: Iterable[int] = (0, 1),
-    samples: int | None = None,
-    damper: RigidDamper | None = None,
-    damper_rows: FloatArray | None = None,
-    start: Start = "zero",
-    slider: ArrayLike | None = None,
-    sweep_down: bool = False,
-    fast_exits: bool = True,
-    settings: Settings | None = None,
-) -> FrequencyResponse:
-    """Forced response of M q'' + C q' + K q = f(t) - B'f_c by multi-harmonic balance.
+@dataclass(frozen=True, eq=False, repr=False)
+class System(Shown):
+    """A system with contacts, and the harmonics that describe its motion.
 
     Parameters
     ----------
-    M, C, K : (n, n) array_like
-        Mass [t], damping [N s/mm] and stiffness [N/mm], dense and symmetric; M positive definite, K
-        may be singular (a body held only by its contacts).
+    matrices : (M, C, K)
+        Mass [t], damping [N s/mm] and stiffness [N/mm], each (n, n), dense and symmetric; M is
+        positive definite, K may be singular (a body held only by its contacts). Of a bladed disk a
+        mapping nodal diameter -> matrices, see `travelling_wave_response`.
     contacts : Contacts
         The contact points and their rows B on the n dofs.
-    harmonic_force : (n,) array_like of complex, or mapping
-        Complex amplitude F of the first harmonic [N], f(t) = Re(F exp(i w t)); a mapping (harmonic
-        number -> amplitude) gives several harmonics.
-    frequencies : (n_f,) array_like
-        Frequencies [Hz], answered at these and between.
     static_force : (n,) array_like, optional
         [N]
-    harmonics : iterable of int
-        A set with or without 0; static loads need it.
-    samples : int, optional
-        Samples per period; by rule when None.
     damper : RigidDamper, optional
         Its dofs and its centrifugal force are appended.
     damper_rows : (n_point, 1 + d, damper.n_dof) ndarray, optional
         The damper's share of the rows, see `contact_rows`; comes together with `damper`.
+    harmonics : iterable of int, optional
+        A set with or without 0; static loads need it. 0 and 1 when None, of a nonlinear mode 0 to
+        9.
+    samples : int, optional
+        Samples per period; by rule when None.
     start : {"zero", "frictionless", "static", "mid", "upper", "lower"}
         Position of the sliders before the march, which decides the residual traction of points that
         stick. "frictionless": where the closed contacts carry the static loads without traction.
     slider : (n_point, d) array_like, optional
         Positions [mm] from which the starts "zero" and "static" begin instead of zero: -T_0 / k_t
         carries the traction T_0 [N] where nothing has moved, a preload along the tangents.
-    sweep_down : bool
-        Go from the highest frequency to the lowest.
-    fast_exits : bool
-        Take the exact linear answers where they are proven.
-    settings : Settings, optional
-        Step control of the continuation.
-
-    Returns
-    -------
-    FrequencyResponse
-        A path that stops early is returned with its status, never raised.
-
-    Raises
-    ------
-    InputError
-        On bad input; all problems are named.
-
-    Examples
-    --------
-    A mass on a spring with a Jenkins element, without any other damping. With one
-    harmonic the peak is (mu N/k_t) / (1 - pi F/(4 mu N)); it is lowest at mu N = pi F/2, where it
-    is pi F/k_t:
-
-    >>> import numpy as np
-    >>> from upd.hbm import contacts, frequency_response
-    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=np.pi / 2)
-    >>> f0 = np.sqrt(1.5) / (2 * np.pi)
-    >>> answer = frequency_response(
-    ...     [[1.0]], [[0.0]], [[1.0]], jenkins,
-    ...     harmonic_force=[1.0], frequencies=np.array([0.9, 1.0, 1.1]) * f0, harmonics=(1,),
-    ...     samples=1024,
-    ... )
-    >>> answer.status
-    'complete'
-    >>> f, height = answer.peak([1.0])
-    >>> float(round(f / f0, 2)), float(round(height / np.pi, 3))
-    (1.0, 1.0)
-
-    There the slider dissipates 4 mu N (A - mu N/k_t) = pi^2 per cycle:
-
-    >>> bool(np.isclose(answer.energy.max(), np.pi**2, rtol=1e-3))
-    True
     """
-    f = np.asarray(frequencies, dtype=float).ravel()
-    rows = (damper, damper_rows)
-    given = GivenSystem(M, C, K, contacts, static_force, *rows, harmonics, samples, start, slider)
-    b = given.balance("frequency_response", f, force_of(harmonic_force), fast_exits=fast_exits)
-    return response_of(b, f, sweep_down, fast_exits, settings)
 
-
-def response_of(
-    b: Balance, f: FloatArray, sweep_down: bool, fast_exits: bool, settings: Settings | None
-) -> FrequencyResponse:
-    """The response of a condensed problem.
-
-    Parameters
-    ----------
-    b : Balance
-    f : (k,) ndarray
-        Frequencies [Hz], in any order.
-    sweep_down, fast_exits, settings
-        As in `frequency_response`.
-
-    Returns
-    -------
-    FrequencyResponse
-    """
-    order = np.unique(f)[::-1] if sweep_down else np.unique(f)
-    with threads_for(b.size):
-        b, curve = solve_curve(b, order, fast_exits, settings)
-        b.linear.kept.forget()
-        return _answer(b, curve)
-
-
-def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
-    """The answer with its status, and warnings about what the path leaves out."""
-    found = measures(b, curve.p, curve.x)
-    worst, astray = found.truncation.max(initial=0.0), int((~found.periodic).sum())
-    status = "not periodic" if curve.status == "complete" and astray else curve.status
-    notes = []
-    if worst > TRUNCATION:
-        h = b.harmonics
-        omitted = [*(str(k) for k in range(h.highest) if k not in h.numbers), f"above {h.highest}"]
-        notes.append(
-            f"the omitted harmonics ({', '.join(omitted)}) would move the contacts by up to "
-            f"{100.0 * worst:.3g} %: take more harmonics"
-        )
-    if astray:
-        at = int(np.argmin(found.periodic))
-        notes.append(
-            f"at {astray} of {len(curve.p)} points, the first at {curve.p[at]:.6g} Hz, the "
-            "contact forces do not come back to their start in 40 periods: they settle slowly, or "
-            'never; start = "mid" or fewer tangents settle at once, '
-            "`upd.hbm.springs.checks.creep` tells what is left"
-        )
-    if found.aliasing.max(initial=0.0) > ALIASING:
-        notes.append(
-            "twice the samples change the contact force by up to "
-            f"{found.aliasing.max():.1%}: take more samples"
-        )
-    for note in notes:
-        log.warning(note)
-    return FrequencyResponse(
-        **vars(found),
-        balance=b,
-        frequency=curve.p,
-        x=curve.x,
-        linear=curve.exact,
-        status=cast(Status, status),
-        message="; ".join([curve.message, *notes]),
-    )
-
-
-class GivenSystem(NamedTuple):
-    """A system with contacts as it is given, see `frequency_response`."""
-
-    M: ArrayLike
-    C: ArrayLike
-    K: ArrayLike
+    matrices: Matrices | Mapping[int, Matrices]
     contacts: Contacts
-    static_force: ArrayLike | None
-    damper: RigidDamper | None
-    damper_rows: FloatArray | None
-    harmonics: Iterable[int]
-    samples: int | None
-    start: Start
-    slider: ArrayLike | None
+    static_force: ArrayLike | None = None
+    damper: RigidDamper | None = None
+    damper_rows: FloatArray | None = None
+    harmonics: Iterable[int] | None = None
+    samples: int | None = None
+    start: Start = "zero"
+    slider: ArrayLike | None = None
+
+    def balanced(self, usual: Iterable[int] = (0, 1)) -> Harmonics:
+        """The harmonics, the usual ones where none are given."""
+        return harmonics(usual if self.harmonics is None else self.harmonics)
 
     def balance(
         self, what: str, f: FloatArray, force: dict[int, ComplexArray] | None, *, fast_exits: bool
@@ -474,8 +344,9 @@ class GivenSystem(NamedTuple):
         force = {1: np.zeros(len(M), dtype=complex)} if force is None else force
         given = self.static_force
         static = np.zeros(len(M)) if given is None else np.asarray(given, float)
-        self._require(what, f, static, force)
-        slider, h, points = self._sliders(what), harmonics(self.harmonics), self.contacts
+        self._require(what, f, static, force, len(M))
+        slider, points = self._sliders(what), self.contacts
+        h = self.balanced()
         self._require_harmonics(what, h, static, force)
         if self.damper is not None and self.damper_rows is not None:
             M, C, K, points = attach(M, C, K, points, self.damper, self.damper_rows)
@@ -492,20 +363,25 @@ class GivenSystem(NamedTuple):
 
     def _dense(self, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The matrices as arrays."""
-        for name, A in (("M", self.M), ("C", self.C), ("K", self.K)):
+        if isinstance(self.matrices, Mapping):
+            raise InputError(
+                f"{what}: matrices belong to nodal diameters; to fix it: give (M, C, K), or call "
+                "travelling_wave_response"
+            )
+        for name, A in zip("MCK", self.matrices, strict=True):
             if hasattr(A, "toarray"):
                 raise InputError(
                     f"{what}: {name} is sparse; to fix it: give {name}.toarray(), or large "
                     "matrices to upd.matrices.response.forced_response, which reduces them"
                 )
-        M, C, K = (np.asarray(A, dtype=float) for A in (self.M, self.C, self.K))
+        M, C, K = (np.asarray(A, dtype=float) for A in self.matrices)
         return M, C, K
 
     def _require(
-        self, what: str, f: FloatArray, static: FloatArray, force: dict[int, ComplexArray]
+        self, what: str, f: FloatArray, static: FloatArray, force: dict[int, ComplexArray], n: int
     ) -> None:
-        """Refuse loads, rows and starts that do not fit the system; all problems are named."""
-        n, columns, starts = len(np.asarray(self.M)), self.contacts.rows.shape[2], get_args(Start)
+        """Refuse loads, rows and starts that do not fit n dofs; all problems are named."""
+        columns, starts = self.contacts.rows.shape[2], get_args(Start)
         found = [
             (
                 not (len(f) and np.isfinite(f).all() and (f > 0).all()),
@@ -570,6 +446,135 @@ class GivenSystem(NamedTuple):
         out = np.zeros((points.n_point, 2))
         out[:, : points.tangents] = place
         return out
+
+
+def frequency_response(
+    system: System,
+    *,
+    harmonic_force: ArrayLike | Mapping[int, ArrayLike],
+    frequencies: ArrayLike,
+    sweep_down: bool = False,
+    fast_exits: bool = True,
+    settings: Settings | None = None,
+) -> FrequencyResponse:
+    """Forced response of M q'' + C q' + K q = f(t) - B'f_c by multi-harmonic balance.
+
+    Parameters
+    ----------
+    system : System
+        The matrices, what rubs between them, and the harmonics.
+    harmonic_force : (n,) array_like of complex, or mapping
+        Complex amplitude F of the first harmonic [N], f(t) = Re(F exp(i w t)); a mapping (harmonic
+        number -> amplitude) gives several harmonics.
+    frequencies : (n_f,) array_like
+        Frequencies [Hz], answered at these and between.
+    sweep_down : bool
+        Go from the highest frequency to the lowest.
+    fast_exits : bool
+        Take the exact linear answers where they are proven.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    FrequencyResponse
+        A path that stops early is returned with its status, never raised.
+
+    Raises
+    ------
+    InputError
+        On bad input; all problems are named.
+
+    Examples
+    --------
+    A mass on a spring with a Jenkins element, without any other damping. With one
+    harmonic the peak is (mu N/k_t) / (1 - pi F/(4 mu N)); it is lowest at mu N = pi F/2, where it
+    is pi F/k_t:
+
+    >>> import numpy as np
+    >>> from upd.hbm import System, contacts, frequency_response
+    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=np.pi / 2)
+    >>> system = System(([[1.0]], [[0.0]], [[1.0]]), jenkins, harmonics=(1,), samples=1024)
+    >>> f0 = np.sqrt(1.5) / (2 * np.pi)
+    >>> f = np.array([0.9, 1.0, 1.1]) * f0
+    >>> answer = frequency_response(system, harmonic_force=[1.0], frequencies=f)
+    >>> answer.status
+    'complete'
+    >>> f, height = answer.peak([1.0])
+    >>> float(round(f / f0, 2)), float(round(height / np.pi, 3))
+    (1.0, 1.0)
+
+    There the slider dissipates 4 mu N (A - mu N/k_t) = pi^2 per cycle:
+
+    >>> bool(np.isclose(answer.energy.max(), np.pi**2, rtol=1e-3))
+    True
+    """
+    f = np.asarray(frequencies, dtype=float).ravel()
+    b = system.balance("frequency_response", f, force_of(harmonic_force), fast_exits=fast_exits)
+    return response_of(b, f, sweep_down, fast_exits, settings)
+
+
+def response_of(
+    b: Balance, f: FloatArray, sweep_down: bool, fast_exits: bool, settings: Settings | None
+) -> FrequencyResponse:
+    """The response of a condensed problem.
+
+    Parameters
+    ----------
+    b : Balance
+    f : (k,) ndarray
+        Frequencies [Hz], in any order.
+    sweep_down, fast_exits, settings
+        As in `frequency_response`.
+
+    Returns
+    -------
+    FrequencyResponse
+    """
+    order = np.unique(f)[::-1] if sweep_down else np.unique(f)
+    with threads_for(b.size):
+        b, curve = solve_curve(b, order, fast_exits, settings)
+        b.linear.kept.forget()
+        return _answer(b, curve)
+
+
+def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
+    """The answer with its status, and warnings about what the path leaves out."""
+    found = measures(b, curve.p, curve.x)
+    worst, astray = found.truncation.max(initial=0.0), int((~found.periodic).sum())
+    status = "not periodic" if curve.status == "complete" and astray else curve.status
+    notes = []
+    if worst > TRUNCATION:
+        h = b.harmonics
+        omitted = [*(str(k) for k in range(h.highest) if k not in h.numbers), f"above {h.highest}"]
+        notes.append(
+            f"the omitted harmonics ({', '.join(omitted)}) would move the contacts by up to "
+            f"{100.0 * worst:.3g} %: take more harmonics"
+        )
+    if astray:
+        at = int(np.argmin(found.periodic))
+        notes.append(
+            f"at {astray} of {len(curve.p)} points, the first at {curve.p[at]:.6g} Hz, the "
+            "contact forces do not come back to their start in 40 periods: they settle slowly, or "
+            'never; start = "mid" or fewer tangents settle at once, '
+            "`upd.hbm.springs.checks.creep` tells what is left"
+        )
+    if found.aliasing.max(initial=0.0) > ALIASING:
+        notes.append(
+            "twice the samples change the contact force by up to "
+            f"{found.aliasing.max():.1%}: take more samples"
+        )
+    for note in notes:
+        log.warning(note)
+    return FrequencyResponse(
+        **vars(found),
+        balance=b,
+        frequency=curve.p,
+        x=curve.x,
+        linear=curve.exact,
+        status=cast(Status, status),
+        message="; ".join([curve.message, *notes]),
+    )
 
 
 def force_of(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:

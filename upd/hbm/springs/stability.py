@@ -95,12 +95,10 @@ def stability(
     --------
     An oscillator that slips is stable:
 
-    >>> from upd.hbm import contacts, frequency_response, stability
+    >>> from upd.hbm import System, contacts, frequency_response, stability
     >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)
-    >>> answer = frequency_response(
-    ...     [[1.0]], [[0.02]], [[1.0]], jenkins,
-    ...     harmonic_force=[0.6], frequencies=[0.18], harmonics=(1, 3, 5),
-    ... )
+    >>> system = System(([[1.0]], [[0.02]], [[1.0]]), jenkins, harmonics=(1, 3, 5))
+    >>> answer = frequency_response(system, harmonic_force=[0.6], frequencies=[0.18])
     >>> stability(answer).label
     ('stable',)
     """

@@ -201,12 +201,10 @@ def steady_state(
     A march confirms the harmonic balance of an oscillator with a Jenkins element:
 
     >>> import numpy as np
-    >>> from upd.hbm import contacts, frequency_response, steady_state
+    >>> from upd.hbm import System, contacts, frequency_response, steady_state
     >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)
-    >>> answer = frequency_response(
-    ...     [[1.0]], [[0.02]], [[1.0]], jenkins,
-    ...     harmonic_force=[0.3], frequencies=[0.18], harmonics=(1, 3, 5),
-    ... )
+    >>> system = System(([[1.0]], [[0.02]], [[1.0]]), jenkins, harmonics=(1, 3, 5))
+    >>> answer = frequency_response(system, harmonic_force=[0.3], frequencies=[0.18])
     >>> march = steady_state(answer.balance, 0.18, answer.x[0], steps=512)
     >>> march.status
     'periodic'

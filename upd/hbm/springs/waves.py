@@ -27,7 +27,7 @@ periodic structures, Int. J. Numer. Meth. Eng. 14 (1979) 81.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import gcd
 from typing import Any, NamedTuple
 
@@ -37,20 +37,17 @@ from scipy.linalg import block_diag
 
 from upd.errors import InputError
 from upd.hbm.core.fourier import Harmonics, to_complex
-from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.modal import Modal, modal
-from upd.hbm.springs.points import Contacts, Start
-from upd.hbm.springs.response import FrequencyResponse, GivenSystem, force_of, response_of
+from upd.hbm.springs.points import Contacts
+from upd.hbm.springs.response import FrequencyResponse, System, force_of, response_of
 from upd.hbm.springs.time_integration import SteadyState, steady_state
 from upd.linalg.parallel import threads_for
 from upd.reduction.cyclic import phase_of
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-Matrices = tuple[ArrayLike, ArrayLike, ArrayLike]
 #: difference of the forces of sectors, relative, up to which they are one engine order
 ALIKE = 1e-9
 
@@ -143,20 +140,12 @@ class WaveBalance(Balance):
 
 
 def travelling_wave_response(
-    sectors: Mapping[int, Matrices],
-    contacts: Contacts,
+    system: System,
     *,
     n_sectors: int,
     engine_order: int,
     harmonic_force: ArrayLike | Mapping[int, ArrayLike],
     frequencies: ArrayLike,
-    static_force: ArrayLike | None = None,
-    harmonics: Iterable[int] = (0, 1),
-    samples: int | None = None,
-    damper: RigidDamper | None = None,
-    damper_rows: FloatArray | None = None,
-    start: Start = "zero",
-    slider: ArrayLike | None = None,
     sweep_down: bool = False,
     fast_exits: bool = True,
     settings: Settings | None = None,
@@ -165,13 +154,15 @@ def travelling_wave_response(
 
     Parameters
     ----------
-    sectors : mapping
-        Nodal diameter -> M [t], C [N s/mm], K [N/mm], each (n, n) and Hermitian, on the same n
-        dofs of a sector. Those of `nodal_diameters` are needed; more of them serve the estimate of
-        what omitted harmonics do.
-    contacts : Contacts
-        The points of one gap, their rows on the n dofs of a sector, then on the n of the next one
-        in the direction of rotation. With a damper: minus (frame @ blade displacement).
+    system : System
+        Its matrices are a mapping nodal diameter -> (M, C, K), each (n, n) and Hermitian, on the
+        same n dofs of a sector. Those of `nodal_diameters` are needed; more of them serve the
+        estimate of what omitted harmonics do. Its contacts are the points of one gap, their rows on
+        the n dofs of a sector, then on the n of the next one in the direction of rotation; with a
+        damper, which moves with its sector's axes: minus (frame @ blade displacement). Its static
+        force acts on every sector. Harmonics with 0 where the normal load varies, or where a static
+        load acts; without where it does not and nothing else holds the mean place of a damper that
+        slips.
     n_sectors, engine_order : int
         N, at least 3, and EO.
     harmonic_force : (n,) or (N, n) array_like of complex, or mapping
@@ -179,13 +170,8 @@ def travelling_wave_response(
         one engine order; a mapping (harmonic number -> amplitude) gives several harmonics.
     frequencies : (n_f,) array_like
         Frequencies [Hz] of the first harmonic, EO times that of rotation.
-    static_force : (n,) array_like, optional
-        On every sector [N].
-    harmonics : iterable of int
-        With 0 where the normal load varies, or where a static load acts; without where it does not
-        and nothing else holds the mean place of a damper that slips.
-    samples, damper, damper_rows, start, slider, sweep_down, fast_exits, settings
-        As in `upd.hbm.frequency_response`; the damper moves with its sector's axes.
+    sweep_down, fast_exits, settings
+        As in `upd.hbm.frequency_response`.
 
     Returns
     -------
@@ -207,12 +193,12 @@ def travelling_wave_response(
     Twelve masses that rub on their neighbours, under the engine order 3:
 
     >>> import numpy as np
-    >>> from upd.hbm import contacts, nodal_diameters, travelling_wave_response
+    >>> from upd.hbm import System, contacts, nodal_diameters, travelling_wave_response
     >>> slider = contacts([[0.0, 0.0]], [[1.0, -1.0]], k_n=0.0, k_t=0.1, mu=1.0, preload=0.5)
     >>> spring = {d: 0.05 * (2 - 2 * np.cos(2 * np.pi * d / 12)) for d in range(7)}
     >>> disk = {d: ([[1.0]], [[0.01]], [[1.0 + spring[d]]]) for d in nodal_diameters(12, 3)}
     >>> answer = travelling_wave_response(
-    ...     disk, slider, n_sectors=12, engine_order=3,
+    ...     System(disk, slider), n_sectors=12, engine_order=3,
     ...     harmonic_force=[1.0], frequencies=[1.04 / (2 * np.pi)],
     ... )
     >>> round(float(answer.amplitude([1.0])[0]), 4)
@@ -220,20 +206,18 @@ def travelling_wave_response(
     """
     f = np.asarray(frequencies, dtype=float).ravel()
     what, N, EO = "travelling_wave_response", n_sectors, engine_order
-    h = harmonics_of(harmonics)
-    kept = _require_waves(what, N, EO, sectors, contacts, damper_rows, h)
+    points, damper, rows = system.contacts, system.damper, system.damper_rows
+    h = system.balanced()
+    kept = _require_waves(what, N, EO, system, h)
     n = len(kept[0][0])
-    near, far = contacts.rows[..., :n], contacts.rows[..., n:]
+    near, far = points.rows[..., :n], points.rows[..., n:]
     force = {k: _one_order(what, v, n, k * EO, N) for k, v in force_of(harmonic_force).items()}
-    M, C, K = kept[0]
-    rows = (damper, damper_rows)
-    mean = Contacts(near + far, contacts.law)
-    given = GivenSystem(M, C, K, mean, static_force, *rows, h.numbers, samples, start, slider)
-    b = given.balance(what, f, force, fast_exits=fast_exits)
+    mean = replace(system, matrices=kept[0], contacts=Contacts(near + far, points.law))
+    b = mean.balance(what, f, force, fast_exits=fast_exits)
     none: tuple[FloatArray, ...] = ()
-    if damper is not None and damper_rows is not None:
-        near = np.concatenate([near, damper_rows], axis=2)
-        far = np.concatenate([far, 0.0 * damper_rows], axis=2)
+    if damper is not None and rows is not None:
+        near = np.concatenate([near, rows], axis=2)
+        far = np.concatenate([far, 0.0 * rows], axis=2)
         none = damper.M, 0.0 * damper.M, damper.K
     joined = {
         d: [block_diag(*pair) for pair in zip(A, none, strict=True)] if none else A
@@ -251,34 +235,31 @@ def travelling_wave_response(
 
 
 def _require_waves(
-    what: str,
-    N: int,
-    EO: int,
-    sectors: Mapping[int, Matrices],
-    contacts: Contacts,
-    damper_rows: FloatArray | None,
-    h: Harmonics,
+    what: str, N: int, EO: int, system: System, h: Harmonics
 ) -> dict[int, tuple[Any, ...]]:
     """The matrices as arrays, real at 0 and N/2; all problems are named."""
     for name, value, least in (("n_sectors", N, 3), ("engine_order", EO, 0)):
         if value != int(value) or value < least:
             raise InputError(f"{what}: {name} = {value!r} must be a whole number, at least {least}")
+    contacts, given, rows = system.contacts, system.matrices, system.damper_rows
+    if not isinstance(given, Mapping):
+        raise InputError(f"{what}: give the matrices of each nodal diameter, {{0: (M, C, K), ...}}")
     law, needed = contacts.law, nodal_diameters(N, EO, h.numbers)
-    A = {d: tuple(np.asarray(one) for one in of) for d, of in sectors.items()}
+    A = {d: tuple(np.asarray(one) for one in of) for d, of in given.items()}
     shapes = {one.shape for of in A.values() for one in of}
     n = len(next(iter(A.values()))[0]) if A else 0
-    moves = np.any(contacts.rows[:, 0]) or (damper_rows is not None and np.any(damper_rows[:, 0]))
+    moves = np.any(contacts.rows[:, 0]) or (rows is not None and np.any(rows[:, 0]))
     waved = [d for d, of in A.items() if 2 * d % N == 0 and any(np.any(one.imag) for one in of)]
     found = [
         (
             not set(needed) <= set(A),
-            f"the harmonics need the nodal diameters {needed}, sectors has {tuple(sorted(A))}",
+            f"the harmonics need the nodal diameters {needed}, matrices has {tuple(sorted(A))}",
         ),
         (
             bool(A) and not 0 <= min(A) <= 2 * max(A) <= N,
-            f"sectors has nodal diameters {tuple(sorted(A))}, give some of 0 to {N // 2}",
+            f"matrices has nodal diameters {tuple(sorted(A))}, give some of 0 to {N // 2}",
         ),
-        (shapes - {(n, n)} != set(), f"sectors has matrices of shapes {sorted(shapes)}, give one"),
+        (shapes - {(n, n)} != set(), f"matrices have shapes {sorted(shapes)}, give one"),
         (bool(waved), f"matrices are complex at nodal diameter {waved}, where waves stand"),
         (
             contacts.rows.shape[2] != 2 * n,

@@ -10,7 +10,7 @@ stand beside ours.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from upd.hbm import contacts, frequency_response, nonlinear_mode, stability
+from upd.hbm import System, contacts, frequency_response, nonlinear_mode, stability
 
 M, C = np.diag([1.0, 1, 1, 1, 0.1, 0.1]), np.diag([20.0] * 4 + [0, 0])
 K = np.diag([3e5] * 4 + [0, 0])
@@ -30,11 +30,9 @@ static, force, out = [0, 0, 0, 0, 0, 120.0], -1j * np.array([0, -20, 5, 0, 0, 0]
 # The forced response with 15 harmonics, beside the printed peak and points; where the motion is
 # unstable it is dashed.
 printed = {150: 2.7919e-5, 160: 2.0006e-4, 162.96: 2.2733e-4, 165: 1.5215e-4, 200: 3.2477e-5}
-answer = frequency_response(
-    M, C, K, faces,
-    static_force=static, harmonic_force=force,
-    frequencies=np.linspace(145.0, 235.0, 91), harmonics=range(16), samples=512,
-)  # fmt: skip
+system = System((M, C, K), faces, static_force=static, harmonics=range(16), samples=512)
+hertz = np.linspace(145.0, 235.0, 91)
+answer = frequency_response(system, harmonic_force=force, frequencies=hertz)
 amplitude = answer.amplitude(out)
 label = np.array(stability(answer).label)
 steady = (label == "stable") | (label == "undecided")
@@ -52,9 +50,8 @@ for f, known in printed.items():
 # %%
 # The third mode over its amplitude, by nine harmonics, beside values by shooting: frequency and
 # damping need no force and no sweep.
-mode = nonlinear_mode(
-    M, C, K, faces, mode=3, amplitudes=np.geomspace(1e-6, 10**-3.4, 40), static_force=static
-)
+system = System((M, C, K), faces, static_force=static)
+mode = nonlinear_mode(system, mode=3, amplitudes=np.geomspace(1e-6, 10**-3.4, 40))
 shooting = {-4.0: (222.9916, 2.1716), -3.8: (212.9318, 4.6632), -3.6: (207.1169, 4.1153)}
 fig, axes = plt.subplots(2, sharex=True)
 shown = {"frequency, Hz": mode.frequency, "damping ratio, %": 100 * mode.damping}
@@ -65,8 +62,8 @@ for k, (name, values) in enumerate(shown.items()):
     axes[k].set_ylabel(name)
 axes[1].set_xlabel("modal amplitude")
 axes[0].legend()
-zeta, at, hertz = mode.largest_damping
-print(f"largest damping {100 * zeta:.2f} % at {hertz:.1f} Hz")
+zeta, at, f = mode.largest_damping
+print(f"largest damping {100 * zeta:.2f} % at {f:.1f} Hz")
 
 # %%
 # From that one curve come the forced peak, and the preload whose peak is lowest for this force.
