@@ -252,11 +252,6 @@ def pressed(
 # -- bodies by products ----------------------------------------------------------------------------
 
 
-def learns(model: ContactModel) -> bool:
-    """Whether a body's compliance is learned."""
-    return any(learners(model, family) for family in model.upper.condensed)
-
-
 def product_checks(
     model: ContactModel, case: Case, components: Sequence[int], force: Array
 ) -> list[Check]:
@@ -292,12 +287,12 @@ def solve_inside(solution: ContactSolution) -> None:
     sphere = solution.plan.scene.sphere_radius is not None
     model, copies = solution.model, solution.plan.copies
     for case in solution.normal:
-        forces = case.solution.force if case.state is None else case.state.force
+        forces = case.solution.force if case.coupled is None else case.coupled.force[-1]
         case.displacement, case.reaction = pressed(model, forces, copies)
         if sphere and case.force > 0.0:
             # without friction it goes with the load
             frictionless = case.displacement
-            if case.state is not None:
+            if case.coupled is not None:
                 frictionless = pressed(model, case.solution.force, copies)[0]
             _add_shares(solution, case, frictionless)
 

@@ -425,10 +425,10 @@ def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
         checks.append(_resolution_check(solution, one))
     arms = tilt_arms(plan, model)
     turned = np.zeros(len(force)) if one.tilt is None else arms @ one.tilt
-    if one.state is not None:
-        nodes = shear_nodes(model, plan.scene.contact.friction, one.state)
+    if one.coupled is not None:
+        nodes = shear_nodes(model, plan.scene.contact.friction, one.coupled)
         checks += tangential_checks(case, model, nodes)
-        turned = turned - opened_by_shear(model, one.state)
+        turned = turned - opened_by_shear(model, one.coupled)
     carried = plan.copies * float(force.sum())
     checks += normal_checks(case, one.force, one.solution, model, carried, turned, one.reaction)
     if one.tilt is None:
@@ -443,10 +443,10 @@ def _tangential(solution: ContactSolution, t: TangentialCase) -> list[Check]:
     """Where the pressure follows the shear also of the normal forces under it."""
     plan, model = solution.plan, solution.model
     checks = tangential_checks(t.case, model, t.nodes)
-    if t.state is not None:
-        answer = as_normal(t.state, float("nan"))
-        turned = tilt_arms(plan, model) @ t.state.motion[3:]
-        turned -= opened_by_shear(model, t.state)
+    if t.coupled is not None:
+        answer = as_normal(t.coupled, float("nan"))
+        turned = tilt_arms(plan, model) @ t.coupled.displacement[-1, 3:]
+        turned -= opened_by_shear(model, t.coupled)
         carried = float(answer.unclipped.sum())
         checks += normal_checks(t.case, t.normal.force, answer, model, carried, turned)
     if solution.curved:

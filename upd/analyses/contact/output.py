@@ -78,9 +78,9 @@ def _normal(solution: ContactSolution, k: Patch, case: NormalCase) -> Variables:
         "gap": variable(XY, k.whole(case.solution.gap), "mm"),
         "contact": variable(XY, k.whole(on) > 0.0, flag_meanings="open contact"),
     }
-    if case.state is not None:
-        traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
-        out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
+    if case.coupled is not None:
+        traction = [pressure(c, on) for c in case.coupled.force[-1, :, 1:].T]
+        out |= _sheared(k, traction, list(case.coupled.slip[-1].T), case.stick)
     return out | _hertz(solution, case)
 
 
@@ -99,7 +99,7 @@ def _sheared(
 
 def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Variables:
     out = _sheared(k, solution.tractions(t), list(t.slip.T), t.stick)
-    if t.state is not None:
+    if t.coupled is not None:
         # which coupled contact moves
         pressure = solution.model.multipliers.pressure(np.maximum(t.pressed, 0.0))
         out["pressure"] = variable(_dims(k), k.whole(pressure), "MPa")

@@ -166,7 +166,7 @@ def _normal(solution: ContactSolution, case: NormalCase, known: References) -> l
     m, at = case.measures, case.case
     resolution = m.area_resolution
     rows = [
-        (q.APPROACH, case.approach),
+        (q.APPROACH, case.solution.approach),
         (_area(solution, q.CONTACT_AREA), m.area),
         (_area(solution, q.CONTACT_AREA_NODES), m.area_nodes),
         (q.MAX_PRESSURE, m.max_pressure),
@@ -219,7 +219,7 @@ def _approach_split(case: NormalCase, known: References) -> list[Result]:
         return []
     at = case.case
     return [
-        *_beside(at, known, (q.APPROACH_CONTACT, case.approach - case.finite_body)),
+        *_beside(at, known, (q.APPROACH_CONTACT, case.solution.approach - case.finite_body)),
         q.APPROACH_FINITE_BODY.of(case.finite_body, at),
         *_beside(at, known, (q.APPROACH_WITHIN_3A, _within_3a(case))),
     ]
@@ -227,14 +227,14 @@ def _approach_split(case: NormalCase, known: References) -> list[Result]:
 
 def _within_3a(case: NormalCase) -> float:
     """Approach within depth 3a, mm."""
-    return case.approach - sum(share.compression for share in case.shares.values())
+    return case.solution.approach - sum(share.compression for share in case.shares.values())
 
 
 # -- stiffness -------------------------------------------------------------------------------------
 
 
 def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
-    at, secant = case.case, case.force / (case.approach - _touch(solution))
+    at, secant = case.case, case.force / (case.solution.approach - _touch(solution))
     raw = (q.K_N_TANGENT_RAW, case.stiffness), (q.K_N_SECANT_RAW, secant)
     out = _beside(at, known, *raw)
     if not solution.curved:
@@ -246,7 +246,7 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
         # contact's (its section 6.5): 23 % of a half-space's displacement lies beyond 3a, so it is
         # 30 % above K_N by Hertz itself. On the coarsest meshes nothing is left within 3a.
         within = _within_3a(case)
-        if within > _ROUNDING * case.approach:
+        if within > _ROUNDING * case.solution.approach:
             rows.append((q.K_N_TANGENT_3A, 1.5 * case.force / within))
         rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, without_body(secant, bodies))]
     stuck = next((total for total, _ in case.stuck.values()), None)
@@ -278,7 +278,7 @@ def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Res
         q.K_N_ALONE.of(case.force / (one.solution.approach - touch), at, n=body)
         for body, one in case.alone.items()
     ]
-    pads = [q.K_N_PER_PAD.of(case.force / (case.approach - touch) / n, at)]
+    pads = [q.K_N_PER_PAD.of(case.force / (case.solution.approach - touch) / n, at)]
     for direction, (total, of) in case.stuck.items():
         way = direction_name(direction)
         out.append(q.K_T_ALL_STUCK.of(total, at, n=way))
