@@ -64,7 +64,7 @@ def prepare(plan: ContactPlan, stages: Stages, kind: str = "contact") -> Contact
         return _prepared(plan, stages, plan.workers)
     return store.remembered(
         kind,
-        model_key(plan, store.threads),
+        needs(plan, store.threads).model,
         partial(_prepared, plan, stages, min(plan.workers, store.threads)),
     )
 
@@ -89,28 +89,16 @@ def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int)
     )
 
 
-def _condensation_keys(plan: ContactPlan, threads: int) -> list[str]:
-    pairs = ((body, family) for body in plan.size for family in plan.families)
-    return [condensation_key(plan, body, family, threads) for body, family in pairs]
-
-
-def model_key(plan: ContactPlan, threads: int) -> str:
-    """Hash of all that the contact model depends on."""
-    return key_of(
-        {
-            "parts": sorted(_condensation_keys(plan, threads)),
-            "memory": plan.scene.solver.memory,
-            "factors": plan.effect("internal displacement"),
-        }
-    )
-
-
 def needs(plan: ContactPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
-    plans = (plan,) if plan.companion is None else (plan, plan.companion)
-    parts = frozenset(key for one in plans for key in _condensation_keys(one, threads))
-    inside = plan.effect("internal displacement")
-    return Needs(model_key(plan, threads), mesh_key(plan), parts, inside)
+    own, *others = (
+        {condensation_key(one, body, f, threads) for body in one.size for f in one.families}
+        for one in (plan, plan.companion)
+        if one is not None
+    )
+    inside, memory = plan.effect("internal displacement"), plan.scene.solver.memory
+    model = key_of({"parts": sorted(own), "memory": memory, "factors": inside})
+    return Needs(model, mesh_key(plan), frozenset(own.union(*others)), inside)
 
 
 def mesh_key(plan: ContactPlan) -> str:
@@ -128,7 +116,6 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     with stages("mesh", scene.recipe):
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     require_contact_sets(scene, meshes, plan.families)
-    meshes = {name: _held(mesh, name, plan) for name, mesh in meshes.items()}
     sides = dict(zip(upper_and_lower(meshes), (1, -1), strict=True))
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
         made = [partial(_body, plan, meshes[name], name, side) for name, side in sides.items()]
@@ -142,19 +129,15 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     return make_contact_model(upper, lower, (0 in plan.mirrors, 1 in plan.mirrors))
 
 
-def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
-    """The mesh with the distant set the scene chose."""
-    chosen = plan.scene.contact.distant.get(name)
-    if chosen is None:
-        return mesh
-    own = f"distant_{chosen}"
-    weights = {key: w for key, w in mesh.weights.items() if key != "distant"}
-    if own in weights:
-        weights["distant"] = weights[own]
-    return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
-
-
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
+    """One body, with the distant set the scene chose."""
+    chosen = plan.scene.contact.distant.get(name)
+    if chosen is not None:
+        own = f"distant_{chosen}"
+        weights = {key: w for key, w in mesh.weights.items() if key != "distant"}
+        if own in weights:
+            weights["distant"] = weights[own]
+        mesh = replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
     data = plan.scene.materials[name]
     material = Material(data.E, data.nu, data.density)
     K = Symmetric.of(stiffness(mesh, material, plan.scene.mesh.element))

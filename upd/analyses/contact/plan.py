@@ -20,7 +20,7 @@ from upd.errors import InputError, OwnMeshError, UpdError
 from upd.linalg.select import EACH, FIRST
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
-from upd.reference import contact_modulus, dundurs_beta, hertz_sphere, sphere_gap
+from upd.reference import contact_modulus, hertz_sphere, sphere_gap
 from upd.results import Case
 from upd.scene import FRICTION_WANTS, Scene, friction_on
 from upd.vary.solve import changed
@@ -254,17 +254,6 @@ def _inside(scene: Scene) -> list[str]:
     return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
 
 
-def beta_of(scene: Scene) -> float:
-    """Size of Dundurs' beta of the scene's two materials: how far pressure shears the contact."""
-    first, second = list(scene.materials.values())[:2]
-    return abs(float(dundurs_beta(first.E, first.nu, second.E, second.nu)))
-
-
-def largest_ratio(scene: Scene) -> float:
-    """Largest T / (mu N) of the tangential loads asked for; zero without any."""
-    return max(scene.loads.tangential, default=0.0) if scene.wants("tangential") else 0.0
-
-
 # -- what the recipe is given ----------------------------------------------------------------------
 
 
@@ -411,32 +400,26 @@ def make_plan(scene: Scene) -> ContactPlan:
             f"materials: a contact has two bodies, {len(scene.materials)} given "
             f"({', '.join(scene.materials)})"
         )
-    loaded = any(load > 0.0 for load in normal_loads(scene))
-    if not is_curved(scene):
-        _require_fitting(scene)
-    symmetry, why = choose_symmetry(scene)
-    families = make_families(scene, symmetry)
-    effects = make_effects(scene, symmetry, why, loaded)
-    parameters = recipe_parameters(scene, symmetry)
-    return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
-
-
-def _require_fitting(scene: Scene) -> None:
-    """Raise InputError for what a flat contact does not take."""
-    problems = []
+    loaded, problems = any(load > 0.0 for load in normal_loads(scene)), []
+    flat_friction = friction_on(scene) and not is_curved(scene)
     axes = {component(d) for d in scene.loads.directions}
-    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
+    if scene.wants("contact_law") and flat_friction and not {ALONG, ACROSS} <= axes:
         problems.append(
             'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
         )
     oblique = [d for d in scene.loads.directions if component(d) is None]
-    if oblique and friction_on(scene) and scene.slip_directions == 1:
+    if oblique and flat_friction and scene.slip_directions == 1:
         problems.append(
             f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
             "directions: set contact.directions = 2"
         )
     if problems:
         raise InputError("\n".join(problems))
+    symmetry, why = choose_symmetry(scene)
+    families = make_families(scene, symmetry)
+    effects = make_effects(scene, symmetry, why, loaded)
+    parameters = recipe_parameters(scene, symmetry)
+    return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
 
 
 def contact_plan(
@@ -578,16 +561,17 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
         return plan
     effects = [replace(e, on=e.on and e.name != "internal displacement") for e in plan.effects]
     # It is sheared as far as the run is, and goes through a cycle only where nothing else is.
-    ratio = largest_ratio(plan.scene)
+    loads, sheared = plan.scene.loads, plan.scene.wants("tangential")
+    ratio = max(loads.tangential, default=0.0) if sheared else 0.0
     want = [w for w in ("stiffness", "tangential") if plan.scene.wants(w)]
     if plan.scene.wants("cycle") and "stiffness" not in want and not ratio > 0.0:
         want.append("cycle")
     looked_at = ("want", tuple(want)), ("loads.tangential", (ratio,))
     # What couples the directions is looked up in the whole compliance.
     scene = changed(plan.scene, (*looked_at, ("solver.route", "condensed"), *ALONE))
-    whole, family = _whole_parameters(scene), (Family(COMPONENTS),)
+    (whole, coarse), family = _companion_parameters(scene), (Family(COMPONENTS),)
     try:
-        companion = contact_plan(scene, "full", family, effects, whole | _coarse(scene, whole))
+        companion = contact_plan(scene, "full", family, effects, whole | coarse)
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
         companion = contact_plan(scene, "full", family, effects, whole)
@@ -600,26 +584,23 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     )
 
 
-def _coarse(scene: Scene, whole: Mapping[str, Any]) -> dict[str, int]:
-    """Half the elements along each edge of the contact, not fewer than it takes."""
+def _companion_parameters(scene: Scene) -> tuple[dict[str, Any], dict[str, int]]:
+    """Of the whole model at the run's spacing, the patch no larger than the largest load needs; and
+    half the elements along each edge of its contact, not fewer than it takes.
+    """
+    parameters = recipe_parameters(scene, "full")
+    if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
+        patch, needed = float(parameters["patch"]), auto_patch(scene)
+        if needed < patch:
+            divisions = 2 * round(0.5 * needed / patch * int(parameters["divisions"])) or 2
+            parameters |= {"patch": needed, "divisions": divisions}
+            if scene.geometry.get("core_depth", "auto") == "auto":
+                parameters["core_depth"] = auto_core_depth(scene, needed)
     fewest = 8 if NODES[scene.mesh.element] == 8 else 4
-    counts = {name: whole.get(name) for name in _DIVISIONS}
-    return {
+    counts = {name: parameters.get(name) for name in _DIVISIONS}
+    coarse = {
         name: max(fewest, 2 * (n // 4))
         for name, n in counts.items()
         if isinstance(n, int) and n > fewest
     }
-
-
-def _whole_parameters(scene: Scene) -> dict[str, Any]:
-    """Of the whole model at the run's spacing; the patch no larger than the largest load needs."""
-    parameters = recipe_parameters(scene, "full")
-    if scene.sphere_radius is None or not max(scene.loads.forces) > 0.0:
-        return parameters
-    patch, needed = float(parameters["patch"]), auto_patch(scene)
-    if needed < patch:
-        divisions = 2 * round(0.5 * needed / patch * int(parameters["divisions"])) or 2
-        parameters |= {"patch": needed, "divisions": divisions}
-        if scene.geometry.get("core_depth", "auto") == "auto":
-            parameters["core_depth"] = auto_core_depth(scene, needed)
-    return parameters
+    return parameters, coarse

@@ -5,7 +5,6 @@ it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -73,8 +72,7 @@ _RAW = "_raw"
 
 
 def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) -> list[Entry]:
-    """At most eight numbers, one per name of ``names`` (shell patterns) that there is, in their
-    order.
+    """At most eight numbers, one per name of ``names`` that there is, in their order.
 
     Where few are found, the same numbers with the bulk compliance of the bodies in them ("..._raw")
     fill up.
@@ -84,25 +82,24 @@ def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) 
     last
         Of the last case that has the number, not of the first.
     """
-    order = list(reversed(results)) if last else list(results)
-    found = [_first(order, name) for name in names]
-    if sum(entry is not None for entry in found) < _FEWEST:
-        found = [
-            entry or _first(order, name + _RAW) for name, entry in zip(names, found, strict=True)
-        ]
-    return [entry for entry in found if entry is not None][:_MOST]
-
-
-def _first(results: Sequence[Entry], name: str) -> Entry | None:
-    return next((entry for entry in results if fnmatchcase(entry["name"], name)), None)
+    first: dict[str, Entry] = {}
+    for entry in reversed(results) if last else results:
+        first.setdefault(entry["name"], entry)
+    few = sum(name in first for name in names) < _FEWEST
+    found = [name if name in first or not few else name + _RAW for name in names]
+    return [first[name] for name in found if name in first][:_MOST]
 
 
 def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Result]:
     """All numbers of a run, case by case; without the ``misfits`` of tractions from their closed
     form where these would cost more than the contact.
     """
-    scene = solution.plan.scene
-    out = _equilibrium(solution)
+    scene, out = solution.plan.scene, []
+    for state, balance in filter(None, normal_loads(scene).values()):
+        at = Case(name="equilibrium", friction=state)
+        right, left = balance.normal_right, balance.normal_left
+        out += [q.F_N.of(right, at), q.F_T.of(balance.tangential_right, at)]
+        out.append(q.F_N_OTHER_FACE.of(left, at))
     for case in solution.normal:
         known = solution.normal_references(case)
         out += _normal(solution, case, known)
@@ -145,18 +142,6 @@ def _beside(case: Case, known: References, *rows: tuple[Quantity, float]) -> lis
 def _area(solution: ContactSolution, area: Quantity) -> Quantity:
     """In um2 for a curved contact, in mm2 for flat faces."""
     return area.in_unit("um2") if solution.curved else area
-
-
-def _equilibrium(solution: ContactSolution) -> list[Result]:
-    out = []
-    for state, balance in filter(None, normal_loads(solution.plan.scene).values()):
-        case = Case(name="equilibrium", friction=state)
-        out += [
-            q.F_N.of(balance.normal_right, case),
-            q.F_T.of(balance.tangential_right, case),
-            q.F_N_OTHER_FACE.of(balance.normal_left, case),
-        ]
-    return out
 
 
 # -- normal loads ----------------------------------------------------------------------------------
@@ -234,11 +219,15 @@ def _within_3a(case: NormalCase) -> float:
 
 
 def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
-    at, secant = case.case, case.force / (case.solution.approach - _touch(solution))
+    # A secant counts from where the faces touch first; a gap that is left at the apex of a curved
+    # body is the lattice's, an overlap is the file's.
+    touch = solution.model.first_touch
+    touch = min(0.0, touch) if solution.curved else touch
+    at, secant = case.case, case.force / (case.solution.approach - touch)
     raw = (q.K_N_TANGENT_RAW, case.stiffness), (q.K_N_SECANT_RAW, secant)
     out = _beside(at, known, *raw)
     if not solution.curved:
-        return out + _stiffness_of_faces(solution, case)
+        return out + _stiffness_of_faces(solution, case, touch)
     bodies = case.finite_body / case.force
     K_N, rows = without_body(case.stiffness, bodies), list[tuple[Quantity, float]]()
     if case.shares:
@@ -258,22 +247,13 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
     return out + _beside(at, known, *rows)
 
 
-def _touch(solution: ContactSolution) -> float:
-    """Approach at which the faces touch first, which a secant counts from, mm.
-
-    A gap that is left at the apex of a curved body is the lattice's, an overlap is the file's.
-    """
-    touch = solution.model.first_touch
-    return min(0.0, touch) if solution.curved else touch
-
-
-def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
+def _stiffness_of_faces(solution: ContactSolution, case: NormalCase, touch: float) -> list[Result]:
     """Each body alone, along each direction; and of one pad where several share
     the contact: the total over their number.
 
     That is each pad's own when they carry equal forces; otherwise their mean.
     """
-    at, n, touch = case.case, len(solution.lattices), _touch(solution)
+    at, n = case.case, len(solution.lattices)
     out = [
         q.K_N_ALONE.of(case.force / (one.solution.approach - touch), at, n=body)
         for body, one in case.alone.items()
