@@ -20,7 +20,7 @@ from upd.analyses.contact.plan import (
     COMPONENTS,
     NORMAL,
     ContactPlan,
-    Family,
+    family_label,
     require_contact_sets,
 )
 from upd.analyses.contact.solution import ContactSolution, NormalCase
@@ -69,7 +69,9 @@ def prepare(plan: ContactPlan, stages: Stages, kind: str = "contact") -> Contact
     )
 
 
-def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int) -> str:
+def condensation_key(
+    plan: ContactPlan, body: str, components: tuple[int, ...], threads: int
+) -> str:
     """Hash of all that one body's condensation for one family of loads depends on, rounding
     included.
     """
@@ -82,8 +84,8 @@ def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int)
             "E": material.E,
             "nu": material.nu,
             "element": scene.mesh.element,
-            "family": [family.components, family.mirror],
-            "solver": _solver(plan, body, family),
+            "family": [components, plan.families[components]],
+            "solver": _solver(plan, body, components),
             "threads": threads,
         }
     )
@@ -107,8 +109,8 @@ def mesh_key(plan: ContactPlan) -> str:
     return key_of({"recipe": plan.scene.recipe, "parameters": dict(plan.parameters), "code": code})
 
 
-def _solver(plan: ContactPlan, body: str, family: Family) -> str:
-    return plan.solver[f"{body}, {family.label}"].partition(":")[0]
+def _solver(plan: ContactPlan, body: str, components: tuple[int, ...]) -> str:
+    return plan.solver[f"{body}, {family_label(components)}"].partition(":")[0]
 
 
 def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
@@ -120,12 +122,12 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
         made = [partial(_body, plan, meshes[name], name, side) for name, side in sides.items()]
         upper, lower = in_parallel(made, workers)
-    jobs = [(body, family) for family in plan.families for body in (upper, lower)]
+    jobs = [(body, components) for components in plan.families for body in (upper, lower)]
     sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
-    with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
+    with stages("condensation", f"{sizes}; {' and '.join(map(family_label, plan.families))}"):
         condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], workers)
-        for (body, family), one in zip(jobs, condensed, strict=True):
-            body.condensed[family.components] = one
+        for (body, components), one in zip(jobs, condensed, strict=True):
+            body.condensed[components] = one
     return make_contact_model(upper, lower, (0 in plan.mirrors, 1 in plan.mirrors))
 
 
@@ -145,17 +147,17 @@ def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
 
 
 def _condensation(
-    plan: ContactPlan, body: Body, family: Family
+    plan: ContactPlan, body: Body, components: tuple[int, ...]
 ) -> tuple[Condensed | LearnedCompliance, NDArray[np.int64]]:
     """One body condensed for one family of loads, or ready for products, and its free dofs."""
     mesh, solver, store = body.mesh, plan.scene.solver, active()
-    free = free_dofs(mesh, family.mirror)
+    free = free_dofs(mesh, plan.families[components])
     kept = np.searchsorted(
-        free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
+        free, np.concatenate([3 * mesh.nodes["contact"] + c for c in components])
     )
-    name = _solver(plan, body.name, family)
+    name = _solver(plan, body.name, components)
     if name.startswith(PRODUCTS):
-        return _by_products(plan, body, family, free, kept, name.removeprefix(PRODUCTS)), free
+        return _by_products(plan, body, components, free, kept, name.removeprefix(PRODUCTS)), free
     with_factor = plan.effect("internal displacement")
 
     def make() -> Condensed:
@@ -179,7 +181,7 @@ def _condensation(
     if store is None:
         condensed = make()
     else:
-        key = condensation_key(plan, body.name, family, store.threads)
+        key = condensation_key(plan, body.name, components, store.threads)
         condensed = stored_condensation(store, key, make, solver=name, with_factor=with_factor)
     condensed.compliance()
     return condensed, free
@@ -188,7 +190,7 @@ def _condensation(
 def _by_products(
     plan: ContactPlan,
     body: Body,
-    family: Family,
+    components: tuple[int, ...],
     free: NDArray[np.int64],
     kept: NDArray[np.int64],
     name: str,
@@ -197,13 +199,13 @@ def _by_products(
     mesh, data = body.mesh, plan.scene.materials[body.name]
     K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)[free]
     require_held(K, modes)
-    held = {"xyz".index(plane[-1]): odd for plane, odd in family.mirror.items()}
+    held = {"xyz".index(plane[-1]): odd for plane, odd in plan.families[components].items()}
     solver: Solver = (
         MultigridSolver(K, modes, layout=free, points=mesh.points)
         if name == "amg"
         else DirectSolver(K, name)
     )
-    start = half_space_start(mesh.points[body.contact], family.components, held, data.E, data.nu)
+    start = half_space_start(mesh.points[body.contact], components, held, data.E, data.nu)
     return LearnedCompliance(solver, len(free), kept, start)
 
 

@@ -46,29 +46,16 @@ REMEDIES = {
 }
 
 
-@dataclass(frozen=True)
-class Family:
-    """Load cases that share supports, hence one condensation per body.
+#: Load cases that share supports, hence one condensation per body: components kept at the contact
+#: nodes and tied at the distant set (0 along the load, 1 across, 2 normal) -> node set on a mirror
+#: plane -> components it holds.
+Families = Mapping[tuple[int, ...], Mapping[str, tuple[int, ...]]]
 
-    Attributes
-    ----------
-    components
-        Kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2
-        normal).
-    mirror
-        Node set on a mirror plane -> components it holds.
-    """
 
-    components: tuple[int, ...]
-    mirror: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-
-    @property
-    def label(self) -> str:
-        """Its components in words."""
-        return " + ".join(
-            {NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c]
-            for c in self.components
-        )
+def family_label(components: Iterable[int]) -> str:
+    """The components of a family of loads in words."""
+    words = {NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}
+    return " + ".join(words[c] for c in components)
 
 
 @dataclass(frozen=True)
@@ -84,7 +71,7 @@ class ContactPlan(Plan[Scene]):
         effects left out.
     """
 
-    families: tuple[Family, ...] = ()
+    families: Families = field(default_factory=dict)
     companion: ContactPlan | None = None
 
     @property
@@ -92,9 +79,8 @@ class ContactPlan(Plan[Scene]):
         """Coordinates whose zero is a mirror plane of the model, from the node sets its load
         families hold.
         """
-        return tuple(
-            sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror})
-        )
+        planes = {plane for mirror in self.families.values() for plane in mirror}
+        return tuple(sorted("xyz".index(plane[-1]) for plane in planes))
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -175,22 +161,23 @@ def choose_symmetry(scene: Scene) -> tuple[str, str]:
     return "half", "geometry and loads share the mirror plane x = 0"
 
 
-def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
+def make_families(scene: Scene, symmetry: str) -> Families:
     """Load cases of the scene, by the supports they share."""
     curved, shear = is_curved(scene), set[int]()
     if scene.coupled or friction_on(scene):
         shear = {c for d in scene.loads.directions for c in slip_components(scene, d)}
     if symmetry == "full" or (curved and symmetry == "half"):
         mirror = {"plane_y": (1,)} if symmetry == "half" else {}
-        return (Family((NORMAL, *sorted(shear)), mirror),)
+        return {(NORMAL, *sorted(shear)): mirror}
     # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it
     # keeps u_x alone).
     beside = {"plane_y": (1,)} if symmetry == "quarter" else {}
     even = (NORMAL, ACROSS) if ACROSS in shear else (NORMAL,)
-    families = [Family(even, {"plane_x": (0,), **beside})]
+    families: dict[tuple[int, ...], Mapping[str, tuple[int, ...]]]
+    families = {even: {"plane_x": (0,), **beside}}
     if ALONG in shear:
-        families.append(Family((ALONG,), {"plane_x": (1, 2), **beside}))
-    return tuple(families)
+        families[ALONG,] = {"plane_x": (1, 2), **beside}
+    return families
 
 
 # -- effects ---------------------------------------------------------------------------------------
@@ -342,13 +329,11 @@ def require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[s
         raise InputError("\n".join(problems))
 
 
-def require_contact_sets(
-    scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]
-) -> None:
+def require_contact_sets(scene: Scene, meshes: Mapping[str, Mesh], families: Families) -> None:
     """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes
     of the loads, and have as many patches as their analysis knows.
     """
-    planes = sorted({plane for family in families for plane in family.mirror})
+    planes = sorted({plane for mirror in families.values() for plane in mirror})
     chosen = scene.contact.distant
     require_sets(scene.recipe, meshes, ("contact", *planes), ("contact",))
     usual = {name: mesh for name, mesh in meshes.items() if name not in chosen}
@@ -425,7 +410,7 @@ def make_plan(scene: Scene) -> ContactPlan:
 def contact_plan(
     scene: Scene,
     symmetry: str,
-    families: tuple[Family, ...],
+    families: Families,
     effects: Sequence[Effect],
     parameters: Mapping[str, Any],
 ) -> ContactPlan:
@@ -457,9 +442,7 @@ def contact_plan(
     return ContactPlan.of(cost, symmetry, parameters, effects, needs, files, families=families)
 
 
-def _add_bodies(
-    cost: CostModel, families: Sequence[Family], weighted: Mapping[str, Sequence[str]]
-) -> None:
+def _add_bodies(cost: CostModel, families: Families, weighted: Mapping[str, Sequence[str]]) -> None:
     """Bodies meshed and condensed, or learned from products.
 
     Parameters
@@ -475,10 +458,10 @@ def _add_bodies(
     for body, count in cost.size.items():
         chosen = scene.contact.distant.get(body)
         in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
-        for family in families:
-            task, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
+        for components in families:
+            task, n_kept = f"{body}, {family_label(components)}", len(components) * count["contact"]
             if is_curved(scene) and not scene.coupled and not in_mean:
-                cost.contact(task, count, n_kept, _products(scene, family), room)
+                cost.contact(task, count, n_kept, _products(scene, components), room)
             else:
                 cost.condensed(task, count, n_kept)
             if in_mean:
@@ -489,13 +472,13 @@ def _add_bodies(
 _CYCLE_CASES = 4
 
 
-def _products(scene: Scene, family: Family) -> int:
+def _products(scene: Scene, components: Collection[int]) -> int:
     """Products that a family of loads takes about."""
     loads, cases = len(scene.loads.normal), 0
-    if NORMAL in family.components:
+    if NORMAL in components:
         cases += loads * (3 if scene.wants("stiffness") else 1)
         cases += scene.loads.curve_points * scene.wants("curve")
-    if ALONG in family.components:
+    if ALONG in components:
         sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
         cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
     return FIRST + EACH * max(cases - 1, 0)
@@ -569,7 +552,8 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     looked_at = ("want", tuple(want)), ("loads.tangential", (ratio,))
     # What couples the directions is looked up in the whole compliance.
     scene = changed(plan.scene, (*looked_at, ("solver.route", "condensed"), *ALONE))
-    (whole, coarse), family = _companion_parameters(scene), (Family(COMPONENTS),)
+    whole, coarse = _companion_parameters(scene)
+    family: Families = {COMPONENTS: {}}
     try:
         companion = contact_plan(scene, "full", family, effects, whole | coarse)
     except UpdError:
