@@ -173,11 +173,8 @@ def make_families(scene: Scene, symmetry: str) -> Families:
     # keeps u_x alone).
     beside = {"plane_y": (1,)} if symmetry == "quarter" else {}
     even = (NORMAL, ACROSS) if ACROSS in shear else (NORMAL,)
-    families: dict[tuple[int, ...], Mapping[str, tuple[int, ...]]]
-    families = {even: {"plane_x": (0,), **beside}}
-    if ALONG in shear:
-        families[ALONG,] = {"plane_x": (1, 2), **beside}
-    return families
+    odd: Families = {(ALONG,): {"plane_x": (1, 2), **beside}} if ALONG in shear else {}
+    return {even: {"plane_x": (0,), **beside}, **odd}
 
 
 # -- effects ---------------------------------------------------------------------------------------

@@ -35,8 +35,6 @@ _LOCATED: References = {
 }
 # Of a sum of three.
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
-# Raw, and with the bulk compliance removed: one mesh's error is in both.
-_OF_APPROACH = (q.APPROACH.name, q.APPROACH_CONTACT.name)
 
 #: the numbers of a curved contact that matter, most important first
 CURVED_HEADLINE = (
@@ -97,9 +95,11 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
     scene, out = solution.plan.scene, []
     for state, balance in filter(None, normal_loads(scene).values()):
         at = Case(name="equilibrium", friction=state)
-        right, left = balance.normal_right, balance.normal_left
-        out += [q.F_N.of(right, at), q.F_T.of(balance.tangential_right, at)]
-        out.append(q.F_N_OTHER_FACE.of(left, at))
+        out += [
+            q.F_N.of(balance.normal_right, at),
+            q.F_T.of(balance.tangential_right, at),
+            q.F_N_OTHER_FACE.of(balance.normal_left, at),
+        ]
     for case in solution.normal:
         known = solution.normal_references(case)
         out += _normal(solution, case, known)
@@ -149,31 +149,30 @@ def _area(solution: ContactSolution, area: Quantity) -> Quantity:
 
 def _normal(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
     m, at = case.measures, case.case
-    resolution = m.area_resolution
+    resolution, out = m.area_resolution, list[Result]()
+    if solution.curved:
+        radii = m.radius_moment, m.radius_area, m.radius_outermost
+        names = q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST
+        out += _beside(at, known, *zip(names, radii, strict=True))
+    out += _approach(case, known)
     rows = [
-        (q.APPROACH, case.solution.approach),
         (_area(solution, q.CONTACT_AREA), m.area),
         (_area(solution, q.CONTACT_AREA_NODES), m.area_nodes),
         (q.MAX_PRESSURE, m.max_pressure),
         (q.MEAN_PRESSURE, m.mean_pressure),
     ]
-    if solution.curved:
-        radii = m.radius_moment, m.radius_area, m.radius_outermost
-        names = q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST
-        rows = [*zip(names, radii, strict=True), *rows]
     if resolution is not None:
         rows.append((_area(solution, q.CONTACT_AREA_RESOLUTION), resolution))
     if solution.plan.effect("friction"):
         stick = solution.area_of(case.stick)
         rows.append((_area(solution, q.STICK_AREA), stick))
-    out = _beside(at, known if resolution is None else _LOCATED, *rows)
+    out += _beside(at, known if resolution is None else _LOCATED, *rows)
     if not solution.curved:
         return out + _of_faces(solution, case)
-    out += _approach_split(case, known)
     hertz = solution.hertz_of(case.force)
     if hertz is not None:
         out.append(q.CLOSED_FORM_ERROR.of(hertz.approach**2 / hertz.radius**2, at))
-    return [_with_estimate(result, case) for result in out]
+    return out
 
 
 def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
@@ -186,28 +185,26 @@ def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
     return out
 
 
-def _with_estimate(result: Result, case: NormalCase) -> Result:
-    """The number with its estimated error where one mesh shows it: the approach."""
-    if result.name not in _OF_APPROACH or case.mesh_error is None:
-        return result
-    near, far = (abs(error) * q.APPROACH.scale / abs(result.value) for error in case.mesh_error)
-    parts = (
-        ErrorPart("mesh at the contact", near, _BETTI),
-        ErrorPart("mesh far away", far, _BETTI),
-    )
-    return with_parts(result, parts)
-
-
-def _approach_split(case: NormalCase, known: References) -> list[Result]:
-    """The approach less the bodies' share, and within depth 3a."""
-    if not case.shares:
-        return []
-    at = case.case
-    return [
-        *_beside(at, known, (q.APPROACH_CONTACT, case.solution.approach - case.finite_body)),
-        q.APPROACH_FINITE_BODY.of(case.finite_body, at),
-        *_beside(at, known, (q.APPROACH_WITHIN_3A, _within_3a(case))),
-    ]
+def _approach(case: NormalCase, known: References) -> list[Result]:
+    """The approach, less the bodies' share, that share, and within depth 3a; with the estimated
+    error where one mesh shows it.
+    """
+    approach, bodies = case.solution.approach, case.finite_body
+    rows = [(q.APPROACH, approach)]
+    if case.shares:
+        rows += [(q.APPROACH_CONTACT, approach - bodies), (q.APPROACH_FINITE_BODY, bodies)]
+        rows.append((q.APPROACH_WITHIN_3A, _within_3a(case)))
+    out = _beside(case.case, known, *rows)
+    if case.mesh_error is not None:
+        # raw, and with the bulk compliance removed: one mesh's error is in both
+        for k, one in enumerate(out[:2]):
+            near, far = (abs(e) * q.APPROACH.scale / abs(one.value) for e in case.mesh_error)
+            parts = (
+                ErrorPart("mesh at the contact", near, _BETTI),
+                ErrorPart("mesh far away", far, _BETTI),
+            )
+            out[k] = with_parts(one, parts)
+    return out
 
 
 def _within_3a(case: NormalCase) -> float:
