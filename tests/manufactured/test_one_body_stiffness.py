@@ -117,7 +117,7 @@ def test_body_alone_by_its_own_finite_elements(scene: str) -> None:
     results = {way: of for case in solution.normal for way, (_, of) in case.stuck.items()}
     for body in (solution.model.upper, solution.model.lower):
         alone = case.alone[body.name].solution
-        family = {c: dict(f.mirror) for f in solution.plan.families for c in f.components}
+        family = {c: dict(mirror) for f, mirror in solution.plan.families.items() for c in f}
         force, u = moved(body, family[NORMAL], alone.contact, NORMAL)
         # A rigid plane pressed in by one: it pushes where it touches, and touches nowhere else.
         assert force.min() > 0.0

@@ -15,6 +15,7 @@ from upd.analyses import analysis_of, make_plan
 from upd.analyses.contact.plan import COMPONENTS, ContactPlan
 from upd.analyses.contact.solution import shear_nodes
 from upd.contact import coupled_contact
+from upd.contact.coulomb_conditions import STICK
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import Result
@@ -74,7 +75,7 @@ def test_the_run_is_coupled_contact_by_hand(toy: str) -> None:
     model, scene, mine = solution.model, solution.plan.scene, numbers(solution)
     N, mu = float(scene.loads.normal[0]), scene.contact.friction
     C = np.block([[model.compliance(i, j) for j in COMPONENTS] for i in COMPONENTS])
-    way = [t.state for t in solution.tangential]
+    way = [t.coupled for t in solution.tangential]
     assert len(way) == 1
     assert len(C) == 3 * len(model.gap)
     assert solution.plan.copies == 1
@@ -99,7 +100,7 @@ def test_the_run_is_coupled_contact_by_hand(toy: str) -> None:
     name = "K_Tx_initial_raw" if toy == "flat" else "K_T_initial_raw"
     assert mine[name, None].value == pytest.approx(K_T, rel=exact)
     full = found.go_on(load=[[N, s * mu * N, 0.0] for s in np.arange(1, 11) / 20.0])
-    force = solution.tangential[0].state.force
+    force = solution.tangential[0].coupled.force[-1]
     largest = np.abs(full.force[-1]).max()
     np.testing.assert_allclose(
         force, full.force[-1], atol=(1e-8 if toy == "flat" else 1e-3) * largest
@@ -189,7 +190,7 @@ def test_a_free_tilt_is_coupled_too() -> None:
     assert case.tilt is not None
     assert not failures(solution)
     assert case.stiffness < held.normal[0].stiffness
-    spoiled = replace(case, state=None)
+    spoiled = replace(case, coupled=None)
     solution = replace(solution, normal=[spoiled])
     assert failures(solution) == {"no penetration", "no force across a gap"}
 
@@ -197,13 +198,13 @@ def test_a_free_tilt_is_coupled_too() -> None:
 def spoiled_force(solution: Any, component: int) -> Any:
     """One sticking node's force beyond its cone, or a tenth of a newton too much of a total."""
     t = solution.tangential[0]
-    found = t.state.found
+    found = t.coupled
     force = found.force.copy()
-    node = int(np.flatnonzero(t.state.stick)[0])
+    node = int(np.flatnonzero(found.state[-1] == STICK)[0])
     force[-1, node, component] += 2.0 * found.load[-1, 0]
-    state = replace(t.state, found=replace(found, force=force))
-    nodes = shear_nodes(solution.model, solution.plan.scene.contact.friction, state)
-    return replace(solution, tangential=[replace(t, state=state, nodes=nodes)])
+    found = replace(found, force=force)
+    nodes = shear_nodes(solution.model, solution.plan.scene.contact.friction, found)
+    return replace(solution, tangential=[replace(t, coupled=found, nodes=nodes)])
 
 
 @pytest.mark.parametrize("toy", TOYS)

@@ -27,7 +27,7 @@ def _analysis(name: str, headline: tuple[str, ...], *, curved: bool) -> Analysis
         needs=needs,
         check_solution=checks.check_solution,
         arrays=output.arrays,
-        sizes=output.sizes,
+        sizes=lambda solution: {"n_pairs": len(solution.model.gap)},
         write_files=output.write_files,
         charts=partial(charts.contact_charts, curved=curved),
         headline=partial(results.pick, names=headline, last=curved),

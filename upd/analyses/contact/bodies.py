@@ -20,7 +20,7 @@ from upd.analyses.contact.plan import (
     COMPONENTS,
     NORMAL,
     ContactPlan,
-    Family,
+    family_label,
     require_contact_sets,
 )
 from upd.analyses.contact.solution import ContactSolution, NormalCase
@@ -64,12 +64,14 @@ def prepare(plan: ContactPlan, stages: Stages, kind: str = "contact") -> Contact
         return _prepared(plan, stages, plan.workers)
     return store.remembered(
         kind,
-        model_key(plan, store.threads),
+        needs(plan, store.threads).model,
         partial(_prepared, plan, stages, min(plan.workers, store.threads)),
     )
 
 
-def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int) -> str:
+def condensation_key(
+    plan: ContactPlan, body: str, components: tuple[int, ...], threads: int
+) -> str:
     """Hash of all that one body's condensation for one family of loads depends on, rounding
     included.
     """
@@ -82,35 +84,23 @@ def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int)
             "E": material.E,
             "nu": material.nu,
             "element": scene.mesh.element,
-            "family": [family.components, family.mirror],
-            "solver": _solver(plan, body, family),
+            "family": [components, plan.families[components]],
+            "solver": _solver(plan, body, components),
             "threads": threads,
-        }
-    )
-
-
-def _condensation_keys(plan: ContactPlan, threads: int) -> list[str]:
-    pairs = ((body, family) for body in plan.size for family in plan.families)
-    return [condensation_key(plan, body, family, threads) for body, family in pairs]
-
-
-def model_key(plan: ContactPlan, threads: int) -> str:
-    """Hash of all that the contact model depends on."""
-    return key_of(
-        {
-            "parts": sorted(_condensation_keys(plan, threads)),
-            "memory": plan.scene.solver.memory,
-            "factors": plan.effect("internal displacement"),
         }
     )
 
 
 def needs(plan: ContactPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
-    plans = (plan,) if plan.companion is None else (plan, plan.companion)
-    parts = frozenset(key for one in plans for key in _condensation_keys(one, threads))
-    inside = plan.effect("internal displacement")
-    return Needs(model_key(plan, threads), mesh_key(plan), parts, inside)
+    own, *others = (
+        {condensation_key(one, body, f, threads) for body in one.size for f in one.families}
+        for one in (plan, plan.companion)
+        if one is not None
+    )
+    inside, memory = plan.effect("internal displacement"), plan.scene.solver.memory
+    model = key_of({"parts": sorted(own), "memory": memory, "factors": inside})
+    return Needs(model, mesh_key(plan), frozenset(own.union(*others)), inside)
 
 
 def mesh_key(plan: ContactPlan) -> str:
@@ -119,8 +109,8 @@ def mesh_key(plan: ContactPlan) -> str:
     return key_of({"recipe": plan.scene.recipe, "parameters": dict(plan.parameters), "code": code})
 
 
-def _solver(plan: ContactPlan, body: str, family: Family) -> str:
-    return plan.solver[f"{body}, {family.label}"].partition(":")[0]
+def _solver(plan: ContactPlan, body: str, components: tuple[int, ...]) -> str:
+    return plan.solver[f"{body}, {family_label(components)}"].partition(":")[0]
 
 
 def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
@@ -128,33 +118,28 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     with stages("mesh", scene.recipe):
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     require_contact_sets(scene, meshes, plan.families)
-    meshes = {name: _held(mesh, name, plan) for name, mesh in meshes.items()}
     sides = dict(zip(upper_and_lower(meshes), (1, -1), strict=True))
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
         made = [partial(_body, plan, meshes[name], name, side) for name, side in sides.items()]
         upper, lower = in_parallel(made, workers)
-    jobs = [(body, family) for family in plan.families for body in (upper, lower)]
+    jobs = [(body, components) for components in plan.families for body in (upper, lower)]
     sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
-    with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
+    with stages("condensation", f"{sizes}; {' and '.join(map(family_label, plan.families))}"):
         condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], workers)
-        for (body, family), one in zip(jobs, condensed, strict=True):
-            body.condensed[family.components] = one
+        for (body, components), one in zip(jobs, condensed, strict=True):
+            body.condensed[components] = one
     return make_contact_model(upper, lower, (0 in plan.mirrors, 1 in plan.mirrors))
 
 
-def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
-    """The mesh with the distant set the scene chose."""
-    chosen = plan.scene.contact.distant.get(name)
-    if chosen is None:
-        return mesh
-    own = f"distant_{chosen}"
-    weights = {key: w for key, w in mesh.weights.items() if key != "distant"}
-    if own in weights:
-        weights["distant"] = weights[own]
-    return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
-
-
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
+    """One body, with the distant set the scene chose."""
+    chosen = plan.scene.contact.distant.get(name)
+    if chosen is not None:
+        own = f"distant_{chosen}"
+        weights = {key: w for key, w in mesh.weights.items() if key != "distant"}
+        if own in weights:
+            weights["distant"] = weights[own]
+        mesh = replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
     data = plan.scene.materials[name]
     material = Material(data.E, data.nu, data.density)
     K = Symmetric.of(stiffness(mesh, material, plan.scene.mesh.element))
@@ -162,17 +147,17 @@ def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
 
 
 def _condensation(
-    plan: ContactPlan, body: Body, family: Family
+    plan: ContactPlan, body: Body, components: tuple[int, ...]
 ) -> tuple[Condensed | LearnedCompliance, NDArray[np.int64]]:
     """One body condensed for one family of loads, or ready for products, and its free dofs."""
     mesh, solver, store = body.mesh, plan.scene.solver, active()
-    free = free_dofs(mesh, family.mirror)
+    free = free_dofs(mesh, plan.families[components])
     kept = np.searchsorted(
-        free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
+        free, np.concatenate([3 * mesh.nodes["contact"] + c for c in components])
     )
-    name = _solver(plan, body.name, family)
+    name = _solver(plan, body.name, components)
     if name.startswith(PRODUCTS):
-        return _by_products(plan, body, family, free, kept, name.removeprefix(PRODUCTS)), free
+        return _by_products(plan, body, components, free, kept, name.removeprefix(PRODUCTS)), free
     with_factor = plan.effect("internal displacement")
 
     def make() -> Condensed:
@@ -196,7 +181,7 @@ def _condensation(
     if store is None:
         condensed = make()
     else:
-        key = condensation_key(plan, body.name, family, store.threads)
+        key = condensation_key(plan, body.name, components, store.threads)
         condensed = stored_condensation(store, key, make, solver=name, with_factor=with_factor)
     condensed.compliance()
     return condensed, free
@@ -205,7 +190,7 @@ def _condensation(
 def _by_products(
     plan: ContactPlan,
     body: Body,
-    family: Family,
+    components: tuple[int, ...],
     free: NDArray[np.int64],
     kept: NDArray[np.int64],
     name: str,
@@ -214,13 +199,13 @@ def _by_products(
     mesh, data = body.mesh, plan.scene.materials[body.name]
     K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)[free]
     require_held(K, modes)
-    held = {"xyz".index(plane[-1]): odd for plane, odd in family.mirror.items()}
+    held = {"xyz".index(plane[-1]): odd for plane, odd in plan.families[components].items()}
     solver: Solver = (
         MultigridSolver(K, modes, layout=free, points=mesh.points)
         if name == "amg"
         else DirectSolver(K, name)
     )
-    start = half_space_start(mesh.points[body.contact], family.components, held, data.E, data.nu)
+    start = half_space_start(mesh.points[body.contact], components, held, data.E, data.nu)
     return LearnedCompliance(solver, len(free), kept, start)
 
 
@@ -250,11 +235,6 @@ def pressed(
 
 
 # -- bodies by products ----------------------------------------------------------------------------
-
-
-def learns(model: ContactModel) -> bool:
-    """Whether a body's compliance is learned."""
-    return any(learners(model, family) for family in model.upper.condensed)
 
 
 def product_checks(
@@ -292,12 +272,12 @@ def solve_inside(solution: ContactSolution) -> None:
     sphere = solution.plan.scene.sphere_radius is not None
     model, copies = solution.model, solution.plan.copies
     for case in solution.normal:
-        forces = case.solution.force if case.state is None else case.state.force
+        forces = case.solution.force if case.coupled is None else case.coupled.force[-1]
         case.displacement, case.reaction = pressed(model, forces, copies)
         if sphere and case.force > 0.0:
             # without friction it goes with the load
             frictionless = case.displacement
-            if case.state is not None:
+            if case.coupled is not None:
                 frictionless = pressed(model, case.solution.force, copies)[0]
             _add_shares(solution, case, frictionless)
 

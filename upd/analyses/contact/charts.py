@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.analyses.face_charts import face_chart, face_pressure, values
 from upd.plot.chart import Axis, Band, Chart, Map, Scatter, Trace
@@ -100,22 +99,17 @@ def _loaded(arrays: Arrays) -> Faces:
     return {
         case: groups
         for case, groups in _by_case(arrays, "normal").items()
-        if any(_closed(group).any() for group in groups)
-        and all(_closed(group).ndim == 2 for group in groups)
+        if any((values(group, "normal_force") > 0.0).any() for group in groups)
+        and all(values(group, "normal_force").ndim == 2 for group in groups)
     }
-
-
-def _closed(group: Group) -> NDArray[np.bool_]:
-    """(n_x, n_y) nodes that carry a normal force."""
-    return np.asarray(group["normal_force"].data > 0.0)
 
 
 def _states(
     case: Case, groups: list[Group], normal: list[Group], *, curved: bool, **more: Any
 ) -> Chart:
     scale = UM if curved else 1.0
-    pairs = zip(groups, normal, strict=True)
-    maps = tuple(state_map(group, _closed(under), scale) for group, under in pairs)
+    pairs = zip(groups, [values(under, "normal_force") > 0.0 for under in normal], strict=True)
+    maps = tuple(state_map(group, closed, scale) for group, closed in pairs)
     more |= {"maps": maps, "size": (5.4, 4.0), "note": "Blue sticks, orange slips."}
     if curved:
         more |= {"size": (4.6, 4.0), **_about_middle(groups[0], normal[0], maps[0])}
@@ -182,7 +176,8 @@ def _path_chart(case: str, groups: list[Group], cycle: bool) -> Chart:
 def _window(normal: Group) -> float:
     """Half width in um of the window around a curved contact."""
     x, y = values(normal, "x", UM), values(normal, "y", UM)
-    reach = np.hypot(*np.meshgrid(x, y, indexing="ij"))[_closed(normal)].max(initial=0.0)
+    distance = np.hypot(*np.meshgrid(x, y, indexing="ij"))
+    reach = distance[values(normal, "normal_force") > 0.0].max(initial=0.0)
     return max(1.3 * float(reach), 3.0 * float(max(np.diff(x).max(), np.diff(y).max())))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import conditions
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of
+from upd.analyses.contact.plan import NORMAL, REMEDIES
 from upd.analyses.contact.solution import (
     ContactSolution,
     LoadPath,
@@ -31,10 +31,9 @@ from upd.analyses.contact.solution import (
 )
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.patch import Patch
 from upd.contact.subsurface import most_stressed, partial_slip_ratio
 from upd.mesh import recipes
-from upd.reference import hertz_yield_load, hertz_yield_point
+from upd.reference import dundurs_beta, hertz_yield_load, hertz_yield_point
 from upd.results import NO_CASE, Case, Check
 from upd.scene import Scene
 
@@ -182,13 +181,15 @@ def _left_out_checks(solution: ContactSolution) -> Iterator[Check]:
     for one in solution.left_out:
         yield one.check(scene.left_out, REMEDIES[one.effect])
     if plan.effect("friction") and not scene.coupled:
+        first, second = list(scene.materials.values())[:2]
+        beta = abs(float(dundurs_beta(first.E, first.nu, second.E, second.nu)))
         what = "|beta|: how much pressure shears half-spaces of unlike materials"
         remedy = (
             "pressure shears the contact of these materials, which the tangential numbers leave "
             'out: set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
         )
         limit = scene.contact.coupling_limit
-        yield _warning("Dundurs beta", NO_CASE, beta_of(scene), limit, what, remedy)
+        yield _warning("Dundurs beta", NO_CASE, beta, limit, what, remedy)
     if scene.mesh.element == "hex8":
         largest = max(one.nu for one in scene.materials.values())
         remedy = (
@@ -203,26 +204,33 @@ def _left_out_checks(solution: ContactSolution) -> Iterator[Check]:
 # -- size and place of the contact -----------------------------------------------------------------
 
 
-def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
-    """The contact must stay clear of the rim of the potential patch: beyond it nothing stops the
-    bodies from overlapping.
+def _size_checks(solution: ContactSolution, case: NormalCase) -> Iterator[Check]:
+    """A curved contact has enough nodes along its radius, and stays clear of the rim of the
+    potential patch: beyond it nothing stops the bodies from overlapping.
     """
-    patch = solution.model.patch
-    half = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y))
+    patch, a = solution.model.patch, case.measures.radius_moment
     # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of
     # its coordinates) has none.
     gap = patch.whole(solution.model.gap).ravel()
-    corner = float(gap[patch.rim()].min() - gap.min())
-    if corner <= 1e-9 * half:
-        return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
-    radius = half**2 / (2.0 * corner)
-    needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
-    ways = {"patch": f'"{needed:.3g} mm" or more, or to "auto"'}
-    without = f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
-    remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
-    remedy += _to_set(solution.plan.scene, ways, without)
-    nodes = solution.rim_nodes(case)
-    return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
+    half, corner = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y)), gap[patch.rim()].min() - gap.min()
+    nodes, what, remedy = 0, "the contact is flat: its rim belongs to it", ""
+    if corner > 1e-9 * half:
+        radius = half**2 / (2.0 * float(corner))
+        needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
+        ways = {"patch": f'"{needed:.3g} mm" or more, or to "auto"'}
+        without = f"mesh a contact surface of {needed:.3g} mm or more, or lower the load"
+        remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
+        remedy += _to_set(solution.plan.scene, ways, without)
+        nodes, what = solution.rim_nodes(case), "rim nodes in contact"
+    yield Check("patch rim", case.case, nodes, 0, what, remedy)
+    if case.force > 0.0:
+        divisions = 2 * np.ceil(1.5 * float(np.ptp(patch.X)) / max(a, 0.1 * patch.spacing))
+        ways = {"patch": '"auto"', "divisions": f"{divisions:.0f} or more"}
+        without = f"mesh the contact surface with elements of {a / 3.0:.3g} mm or less"
+        remedy = "fewer than 3 nodes along the contact radius, so the numbers of this load are "
+        remedy += f"rough: {_to_set(solution.plan.scene, ways, without)}"
+        size, what = 3.0 * patch.spacing, "3 h / a (a contact radius, h spacing)"
+        yield _warning("resolution", case.case, size / max(a, 1e-300), 1.0, what, remedy)
 
 
 def _to_set(scene: Scene, ways: Mapping[str, str], without: str) -> str:
@@ -233,17 +241,6 @@ def _to_set(scene: Scene, ways: Mapping[str, str], without: str) -> str:
         if recipes.has_parameter(scene.recipe, name)
     ]
     return f"set {' or '.join(known)}" if known else without
-
-
-def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
-    patch, radius = solution.model.patch, case.measures.radius_moment
-    divisions = 2 * np.ceil(1.5 * float(np.ptp(patch.X)) / max(radius, 0.1 * patch.spacing))
-    ways = {"patch": '"auto"', "divisions": f"{divisions:.0f} or more"}
-    without = f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
-    remedy = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
-    remedy += _to_set(solution.plan.scene, ways, without)
-    value, what = 3.0 * patch.spacing / max(radius, 1e-300), "3 h / a (a contact radius, h spacing)"
-    return _warning("resolution", case.case, value, 1.0, what, remedy)
 
 
 def _flat_resolution_check(solution: ContactSolution) -> Check:
@@ -309,8 +306,7 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
         by_hertz = solution.hertz_of(normal.force) is not None
         if isinstance(one, TangentialCase):
             by_hertz = solution.closed_form_traction(one) is not None
-        fields = [] if by_hertz else _fields(solution, one)
-        faces = [] if by_hertz else [on_lines(k, fields) for k in solution.lattices.values()]
+        faces = [] if by_hertz else _surface_loads(solution, one)
         for body in limited:
             limit = scene.materials[body.name].yield_stress
             assert limit is not None
@@ -325,14 +321,35 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
             yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
 
 
-def _fields(solution: ContactSolution, one: NormalCase | TangentialCase) -> list[Array]:
-    """Pressure and, under a tangential load, tractions on the lower body along x and y, MPa."""
-    pressure = solution.model.multipliers.pressure
+def _surface_loads(
+    solution: ContactSolution, one: NormalCase | TangentialCase
+) -> list[tuple[Array, Array, list[Array]]]:
+    """Of each patch, lattice lines in mm with pressure and, under a tangential load, tractions on
+    the lower body along x and y, MPa.
+
+    Without lattice lines on as many even ones as there are nodes, linear between the nodes and zero
+    off the patch.
+    """
+    pressure, out = solution.model.multipliers.pressure, []
     if isinstance(one, NormalCase):
-        return [pressure(one.solution.force)]
-    shear = np.zeros((2, len(one.pressed)))
-    shear[list(one.nodes.components)] = solution.tractions(one)
-    return [pressure(np.maximum(one.pressed, 0.0)), *shear]
+        fields = [pressure(one.solution.force)]
+    else:
+        shear = np.zeros((2, len(one.pressed)))
+        shear[list(one.nodes.components)] = solution.tractions(one)
+        fields = [pressure(np.maximum(one.pressed, 0.0)), *shear]
+    for patch in solution.lattices.values():
+        x, y, whole = patch.X, patch.Y, [patch.whole(field) for field in fields]
+        if patch.quads is not None:
+            # slow to import: only where it is called
+            from scipy.interpolate import LinearNDInterpolator
+
+            points = patch.points()
+            n = int(np.ceil(np.sqrt(len(points))))
+            x, y = (np.linspace(v.min(), v.max(), n) for v in points.T)
+            between = LinearNDInterpolator(points, np.column_stack(whole), 0.0)
+            whole = list(np.moveaxis(between(*np.meshgrid(x, y, indexing="ij")), -1, 0))
+        out.append((x, y, whole))
+    return out
 
 
 def _hertz_stress(
@@ -356,24 +373,6 @@ def _hertz_stress(
     return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
 
 
-def on_lines(patch: Patch, fields: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
-    """Lattice lines and fields of the model's nodes on them; without lines on as many even ones as
-    there are nodes, linear between the nodes and zero off the patch.
-    """
-    whole = [patch.whole(one) for one in fields]
-    if patch.quads is None:
-        return patch.X, patch.Y, whole
-    # slow to import: only where it is called
-    from scipy.interpolate import LinearNDInterpolator
-
-    points = patch.points()
-    n = int(np.ceil(np.sqrt(len(points))))
-    x, y = (np.linspace(v.min(), v.max(), n) for v in points.T)
-    between = LinearNDInterpolator(points, np.column_stack(whole), 0.0)
-    found = between(*np.meshgrid(x, y, indexing="ij"))
-    return x, y, list(np.moveaxis(found, -1, 0))
-
-
 def _half_space_stress(
     faces: Sequence[tuple[Array, Array, list[Array]]], sign: float, nu: float
 ) -> tuple[float, str]:
@@ -382,8 +381,7 @@ def _half_space_stress(
     Parameters
     ----------
     faces
-        Of each patch, lattice lines in mm, and nodal pressure and, under a tangential load,
-        tractions on the lower body along x and y, MPa.
+        `_surface_loads`.
     sign
         Of the tractions on the body.
     """
@@ -417,18 +415,17 @@ def check_solution(solution: ContactSolution) -> list[Check]:
 
 def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
     model, plan, force, case = solution.model, solution.plan, one.solution.force, one.case
-    checks = [_rim_check(solution, one)] if solution.curved else []
+    checks = list(_size_checks(solution, one)) if solution.curved else []
     if not one.force > 0.0:
         return checks
     if solution.curved:
         checks += product_checks(model, case, (NORMAL,), force)
-        checks.append(_resolution_check(solution, one))
     arms = tilt_arms(plan, model)
     turned = np.zeros(len(force)) if one.tilt is None else arms @ one.tilt
-    if one.state is not None:
-        nodes = shear_nodes(model, plan.scene.contact.friction, one.state)
+    if one.coupled is not None:
+        nodes = shear_nodes(model, plan.scene.contact.friction, one.coupled)
         checks += tangential_checks(case, model, nodes)
-        turned = turned - opened_by_shear(model, one.state)
+        turned = turned - opened_by_shear(model, one.coupled)
     carried = plan.copies * float(force.sum())
     checks += normal_checks(case, one.force, one.solution, model, carried, turned, one.reaction)
     if one.tilt is None:
@@ -443,10 +440,10 @@ def _tangential(solution: ContactSolution, t: TangentialCase) -> list[Check]:
     """Where the pressure follows the shear also of the normal forces under it."""
     plan, model = solution.plan, solution.model
     checks = tangential_checks(t.case, model, t.nodes)
-    if t.state is not None:
-        answer = as_normal(t.state, float("nan"))
-        turned = tilt_arms(plan, model) @ t.state.motion[3:]
-        turned -= opened_by_shear(model, t.state)
+    if t.coupled is not None:
+        answer = as_normal(t.coupled, float("nan"))
+        turned = tilt_arms(plan, model) @ t.coupled.displacement[-1, 3:]
+        turned -= opened_by_shear(model, t.coupled)
         carried = float(answer.unclipped.sum())
         checks += normal_checks(t.case, t.normal.force, answer, model, carried, turned)
     if solution.curved:

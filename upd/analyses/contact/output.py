@@ -31,11 +31,6 @@ _ACROSS, _ALONG = 801, 201
 _BEYOND = 1.3
 
 
-def sizes(solution: ContactSolution) -> dict[str, int]:
-    """Contact pairs of the model."""
-    return {"n_pairs": len(solution.model.gap)}
-
-
 def arrays(solution: ContactSolution) -> dict[str, Group]:
     """Fields of every case and patch with their closed forms; curves, paths and contact points."""
     out: dict[str, Group] = {}
@@ -78,10 +73,13 @@ def _normal(solution: ContactSolution, k: Patch, case: NormalCase) -> Variables:
         "gap": variable(XY, k.whole(case.solution.gap), "mm"),
         "contact": variable(XY, k.whole(on) > 0.0, flag_meanings="open contact"),
     }
-    if case.state is not None:
-        traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
-        out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
-    return out | _hertz(solution, case)
+    if case.coupled is not None:
+        traction = [pressure(c, on) for c in case.coupled.force[-1, :, 1:].T]
+        out |= _sheared(k, traction, list(case.coupled.slip[-1].T), case.stick)
+    if hertz := solution.hertz_of(case.force):
+        out["hertz_radius"] = variable("", hertz.radius, "mm")
+        out["hertz_max_pressure"] = variable("", hertz.max_pressure, "MPa")
+    return out
 
 
 def _sheared(
@@ -99,40 +97,23 @@ def _sheared(
 
 def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Variables:
     out = _sheared(k, solution.tractions(t), list(t.slip.T), t.stick)
-    if t.state is not None:
+    if t.coupled is not None:
         # which coupled contact moves
         pressure = solution.model.multipliers.pressure(np.maximum(t.pressed, 0.0))
         out["pressure"] = variable(_dims(k), k.whole(pressure), "MPa")
-    return out | _cattaneo(solution, t)
-
-
-# -- closed forms ----------------------------------------------------------------------------------
-
-
-def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
-    hertz = solution.hertz_of(case.force)
-    if hertz is None:
-        return {}
-    return {
-        "hertz_radius": variable("", hertz.radius, "mm"),
-        "hertz_max_pressure": variable("", hertz.max_pressure, "MPa"),
-    }
-
-
-def _cattaneo(solution: ContactSolution, t: TangentialCase) -> Variables:
     hertz, c = solution.hertz_of(t.normal.force), solution.stick_radius(t)
-    if hertz is None or c is None:
-        return {}
-    out: Variables = {
-        "hertz_radius": variable("", hertz.radius, "mm"),
-        "mindlin_stick_radius": variable("", c, "mm"),
-    }
+    if hertz is not None and c is not None:
+        out["hertz_radius"] = variable("", hertz.radius, "mm")
+        out["mindlin_stick_radius"] = variable("", c, "mm")
     closed = solution.closed_form_traction(t)
-    if closed is not None:
+    if hertz is not None and closed is not None:
         x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
         out["mindlin_x"] = variable("mindlin_x", x, "mm")
         out["mindlin_traction"] = variable("mindlin_x", closed(np.abs(x)), "MPa")
     return out
+
+
+# -- closed forms ----------------------------------------------------------------------------------
 
 
 def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
@@ -164,12 +145,7 @@ def _curve(solution: ContactSolution) -> Variables:
     F, d = (np.array(values) for values in zip(*solution.curve, strict=True))
     # It starts where the faces meet.
     d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
-    own = _approach_over_load(solution, d, F) if solution.curved else {}
-    return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
-
-
-def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variables:
-    out: Variables = {}
+    out = {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")}
     split = [case for case in solution.normal if case.shares]
     if split:
         # What the bodies add goes with the load.

@@ -20,7 +20,7 @@ from upd.errors import InputError, OwnMeshError, UpdError
 from upd.linalg.select import EACH, FIRST
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
-from upd.reference import contact_modulus, dundurs_beta, hertz_sphere, sphere_gap
+from upd.reference import contact_modulus, hertz_sphere, sphere_gap
 from upd.results import Case
 from upd.scene import FRICTION_WANTS, Scene, friction_on
 from upd.vary.solve import changed
@@ -46,29 +46,16 @@ REMEDIES = {
 }
 
 
-@dataclass(frozen=True)
-class Family:
-    """Load cases that share supports, hence one condensation per body.
+#: Load cases that share supports, hence one condensation per body: components kept at the contact
+#: nodes and tied at the distant set (0 along the load, 1 across, 2 normal) -> node set on a mirror
+#: plane -> components it holds.
+Families = Mapping[tuple[int, ...], Mapping[str, tuple[int, ...]]]
 
-    Attributes
-    ----------
-    components
-        Kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2
-        normal).
-    mirror
-        Node set on a mirror plane -> components it holds.
-    """
 
-    components: tuple[int, ...]
-    mirror: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-
-    @property
-    def label(self) -> str:
-        """Its components in words."""
-        return " + ".join(
-            {NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c]
-            for c in self.components
-        )
+def family_label(components: Iterable[int]) -> str:
+    """The components of a family of loads in words."""
+    words = {NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}
+    return " + ".join(words[c] for c in components)
 
 
 @dataclass(frozen=True)
@@ -84,7 +71,7 @@ class ContactPlan(Plan[Scene]):
         effects left out.
     """
 
-    families: tuple[Family, ...] = ()
+    families: Families = field(default_factory=dict)
     companion: ContactPlan | None = None
 
     @property
@@ -92,9 +79,8 @@ class ContactPlan(Plan[Scene]):
         """Coordinates whose zero is a mirror plane of the model, from the node sets its load
         families hold.
         """
-        return tuple(
-            sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror})
-        )
+        planes = {plane for mirror in self.families.values() for plane in mirror}
+        return tuple(sorted("xyz".index(plane[-1]) for plane in planes))
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -175,22 +161,20 @@ def choose_symmetry(scene: Scene) -> tuple[str, str]:
     return "half", "geometry and loads share the mirror plane x = 0"
 
 
-def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
+def make_families(scene: Scene, symmetry: str) -> Families:
     """Load cases of the scene, by the supports they share."""
     curved, shear = is_curved(scene), set[int]()
     if scene.coupled or friction_on(scene):
         shear = {c for d in scene.loads.directions for c in slip_components(scene, d)}
     if symmetry == "full" or (curved and symmetry == "half"):
         mirror = {"plane_y": (1,)} if symmetry == "half" else {}
-        return (Family((NORMAL, *sorted(shear)), mirror),)
+        return {(NORMAL, *sorted(shear)): mirror}
     # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it
     # keeps u_x alone).
     beside = {"plane_y": (1,)} if symmetry == "quarter" else {}
     even = (NORMAL, ACROSS) if ACROSS in shear else (NORMAL,)
-    families = [Family(even, {"plane_x": (0,), **beside})]
-    if ALONG in shear:
-        families.append(Family((ALONG,), {"plane_x": (1, 2), **beside}))
-    return tuple(families)
+    odd: Families = {(ALONG,): {"plane_x": (1, 2), **beside}} if ALONG in shear else {}
+    return {even: {"plane_x": (0,), **beside}, **odd}
 
 
 # -- effects ---------------------------------------------------------------------------------------
@@ -252,17 +236,6 @@ def _inside(scene: Scene) -> list[str]:
         return [w for w in scene.want if w == "fields"]
     wanted = ("fields", "body_compression", "stiffness")
     return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
-
-
-def beta_of(scene: Scene) -> float:
-    """Size of Dundurs' beta of the scene's two materials: how far pressure shears the contact."""
-    first, second = list(scene.materials.values())[:2]
-    return abs(float(dundurs_beta(first.E, first.nu, second.E, second.nu)))
-
-
-def largest_ratio(scene: Scene) -> float:
-    """Largest T / (mu N) of the tangential loads asked for; zero without any."""
-    return max(scene.loads.tangential, default=0.0) if scene.wants("tangential") else 0.0
 
 
 # -- what the recipe is given ----------------------------------------------------------------------
@@ -353,13 +326,11 @@ def require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[s
         raise InputError("\n".join(problems))
 
 
-def require_contact_sets(
-    scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]
-) -> None:
+def require_contact_sets(scene: Scene, meshes: Mapping[str, Mesh], families: Families) -> None:
     """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes
     of the loads, and have as many patches as their analysis knows.
     """
-    planes = sorted({plane for family in families for plane in family.mirror})
+    planes = sorted({plane for mirror in families.values() for plane in mirror})
     chosen = scene.contact.distant
     require_sets(scene.recipe, meshes, ("contact", *planes), ("contact",))
     usual = {name: mesh for name, mesh in meshes.items() if name not in chosen}
@@ -411,9 +382,21 @@ def make_plan(scene: Scene) -> ContactPlan:
             f"materials: a contact has two bodies, {len(scene.materials)} given "
             f"({', '.join(scene.materials)})"
         )
-    loaded = any(load > 0.0 for load in normal_loads(scene))
-    if not is_curved(scene):
-        _require_fitting(scene)
+    loaded, problems = any(load > 0.0 for load in normal_loads(scene)), []
+    flat_friction = friction_on(scene) and not is_curved(scene)
+    axes = {component(d) for d in scene.loads.directions}
+    if scene.wants("contact_law") and flat_friction and not {ALONG, ACROSS} <= axes:
+        problems.append(
+            'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
+        )
+    oblique = [d for d in scene.loads.directions if component(d) is None]
+    if oblique and flat_friction and scene.slip_directions == 1:
+        problems.append(
+            f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
+            "directions: set contact.directions = 2"
+        )
+    if problems:
+        raise InputError("\n".join(problems))
     symmetry, why = choose_symmetry(scene)
     families = make_families(scene, symmetry)
     effects = make_effects(scene, symmetry, why, loaded)
@@ -421,28 +404,10 @@ def make_plan(scene: Scene) -> ContactPlan:
     return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
 
 
-def _require_fitting(scene: Scene) -> None:
-    """Raise InputError for what a flat contact does not take."""
-    problems = []
-    axes = {component(d) for d in scene.loads.directions}
-    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
-        problems.append(
-            'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
-        )
-    oblique = [d for d in scene.loads.directions if component(d) is None]
-    if oblique and friction_on(scene) and scene.slip_directions == 1:
-        problems.append(
-            f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
-            "directions: set contact.directions = 2"
-        )
-    if problems:
-        raise InputError("\n".join(problems))
-
-
 def contact_plan(
     scene: Scene,
     symmetry: str,
-    families: tuple[Family, ...],
+    families: Families,
     effects: Sequence[Effect],
     parameters: Mapping[str, Any],
 ) -> ContactPlan:
@@ -474,9 +439,7 @@ def contact_plan(
     return ContactPlan.of(cost, symmetry, parameters, effects, needs, files, families=families)
 
 
-def _add_bodies(
-    cost: CostModel, families: Sequence[Family], weighted: Mapping[str, Sequence[str]]
-) -> None:
+def _add_bodies(cost: CostModel, families: Families, weighted: Mapping[str, Sequence[str]]) -> None:
     """Bodies meshed and condensed, or learned from products.
 
     Parameters
@@ -492,10 +455,10 @@ def _add_bodies(
     for body, count in cost.size.items():
         chosen = scene.contact.distant.get(body)
         in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
-        for family in families:
-            task, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
+        for components in families:
+            task, n_kept = f"{body}, {family_label(components)}", len(components) * count["contact"]
             if is_curved(scene) and not scene.coupled and not in_mean:
-                cost.contact(task, count, n_kept, _products(scene, family), room)
+                cost.contact(task, count, n_kept, _products(scene, components), room)
             else:
                 cost.condensed(task, count, n_kept)
             if in_mean:
@@ -506,13 +469,13 @@ def _add_bodies(
 _CYCLE_CASES = 4
 
 
-def _products(scene: Scene, family: Family) -> int:
+def _products(scene: Scene, components: Collection[int]) -> int:
     """Products that a family of loads takes about."""
     loads, cases = len(scene.loads.normal), 0
-    if NORMAL in family.components:
+    if NORMAL in components:
         cases += loads * (3 if scene.wants("stiffness") else 1)
         cases += scene.loads.curve_points * scene.wants("curve")
-    if ALONG in family.components:
+    if ALONG in components:
         sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
         cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
     return FIRST + EACH * max(cases - 1, 0)
@@ -578,16 +541,18 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
         return plan
     effects = [replace(e, on=e.on and e.name != "internal displacement") for e in plan.effects]
     # It is sheared as far as the run is, and goes through a cycle only where nothing else is.
-    ratio = largest_ratio(plan.scene)
+    loads, sheared = plan.scene.loads, plan.scene.wants("tangential")
+    ratio = max(loads.tangential, default=0.0) if sheared else 0.0
     want = [w for w in ("stiffness", "tangential") if plan.scene.wants(w)]
     if plan.scene.wants("cycle") and "stiffness" not in want and not ratio > 0.0:
         want.append("cycle")
     looked_at = ("want", tuple(want)), ("loads.tangential", (ratio,))
     # What couples the directions is looked up in the whole compliance.
     scene = changed(plan.scene, (*looked_at, ("solver.route", "condensed"), *ALONE))
-    whole, family = _whole_parameters(scene), (Family(COMPONENTS),)
+    whole, coarse = _companion_parameters(scene)
+    family: Families = {COMPONENTS: {}}
     try:
-        companion = contact_plan(scene, "full", family, effects, whole | _coarse(scene, whole))
+        companion = contact_plan(scene, "full", family, effects, whole | coarse)
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
         companion = contact_plan(scene, "full", family, effects, whole)
@@ -600,26 +565,23 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     )
 
 
-def _coarse(scene: Scene, whole: Mapping[str, Any]) -> dict[str, int]:
-    """Half the elements along each edge of the contact, not fewer than it takes."""
+def _companion_parameters(scene: Scene) -> tuple[dict[str, Any], dict[str, int]]:
+    """Of the whole model at the run's spacing, the patch no larger than the largest load needs; and
+    half the elements along each edge of its contact, not fewer than it takes.
+    """
+    parameters = recipe_parameters(scene, "full")
+    if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
+        patch, needed = float(parameters["patch"]), auto_patch(scene)
+        if needed < patch:
+            divisions = 2 * round(0.5 * needed / patch * int(parameters["divisions"])) or 2
+            parameters |= {"patch": needed, "divisions": divisions}
+            if scene.geometry.get("core_depth", "auto") == "auto":
+                parameters["core_depth"] = auto_core_depth(scene, needed)
     fewest = 8 if NODES[scene.mesh.element] == 8 else 4
-    counts = {name: whole.get(name) for name in _DIVISIONS}
-    return {
+    counts = {name: parameters.get(name) for name in _DIVISIONS}
+    coarse = {
         name: max(fewest, 2 * (n // 4))
         for name, n in counts.items()
         if isinstance(n, int) and n > fewest
     }
-
-
-def _whole_parameters(scene: Scene) -> dict[str, Any]:
-    """Of the whole model at the run's spacing; the patch no larger than the largest load needs."""
-    parameters = recipe_parameters(scene, "full")
-    if scene.sphere_radius is None or not max(scene.loads.forces) > 0.0:
-        return parameters
-    patch, needed = float(parameters["patch"]), auto_patch(scene)
-    if needed < patch:
-        divisions = 2 * round(0.5 * needed / patch * int(parameters["divisions"])) or 2
-        parameters |= {"patch": needed, "divisions": divisions}
-        if scene.geometry.get("core_depth", "auto") == "auto":
-            parameters["core_depth"] = auto_core_depth(scene, needed)
-    return parameters
+    return parameters, coarse

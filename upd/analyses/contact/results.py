@@ -5,7 +5,6 @@ it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -36,8 +35,6 @@ _LOCATED: References = {
 }
 # Of a sum of three.
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
-# Raw, and with the bulk compliance removed: one mesh's error is in both.
-_OF_APPROACH = (q.APPROACH.name, q.APPROACH_CONTACT.name)
 
 #: the numbers of a curved contact that matter, most important first
 CURVED_HEADLINE = (
@@ -73,8 +70,7 @@ _RAW = "_raw"
 
 
 def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) -> list[Entry]:
-    """At most eight numbers, one per name of ``names`` (shell patterns) that there is, in their
-    order.
+    """At most eight numbers, one per name of ``names`` that there is, in their order.
 
     Where few are found, the same numbers with the bulk compliance of the bodies in them ("..._raw")
     fill up.
@@ -84,25 +80,26 @@ def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) 
     last
         Of the last case that has the number, not of the first.
     """
-    order = list(reversed(results)) if last else list(results)
-    found = [_first(order, name) for name in names]
-    if sum(entry is not None for entry in found) < _FEWEST:
-        found = [
-            entry or _first(order, name + _RAW) for name, entry in zip(names, found, strict=True)
-        ]
-    return [entry for entry in found if entry is not None][:_MOST]
-
-
-def _first(results: Sequence[Entry], name: str) -> Entry | None:
-    return next((entry for entry in results if fnmatchcase(entry["name"], name)), None)
+    first: dict[str, Entry] = {}
+    for entry in reversed(results) if last else results:
+        first.setdefault(entry["name"], entry)
+    few = sum(name in first for name in names) < _FEWEST
+    found = [name if name in first or not few else name + _RAW for name in names]
+    return [first[name] for name in found if name in first][:_MOST]
 
 
 def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Result]:
     """All numbers of a run, case by case; without the ``misfits`` of tractions from their closed
     form where these would cost more than the contact.
     """
-    scene = solution.plan.scene
-    out = _equilibrium(solution)
+    scene, out = solution.plan.scene, []
+    for state, balance in filter(None, normal_loads(scene).values()):
+        at = Case(name="equilibrium", friction=state)
+        out += [
+            q.F_N.of(balance.normal_right, at),
+            q.F_T.of(balance.tangential_right, at),
+            q.F_N_OTHER_FACE.of(balance.normal_left, at),
+        ]
     for case in solution.normal:
         known = solution.normal_references(case)
         out += _normal(solution, case, known)
@@ -147,48 +144,35 @@ def _area(solution: ContactSolution, area: Quantity) -> Quantity:
     return area.in_unit("um2") if solution.curved else area
 
 
-def _equilibrium(solution: ContactSolution) -> list[Result]:
-    out = []
-    for state, balance in filter(None, normal_loads(solution.plan.scene).values()):
-        case = Case(name="equilibrium", friction=state)
-        out += [
-            q.F_N.of(balance.normal_right, case),
-            q.F_T.of(balance.tangential_right, case),
-            q.F_N_OTHER_FACE.of(balance.normal_left, case),
-        ]
-    return out
-
-
 # -- normal loads ----------------------------------------------------------------------------------
 
 
 def _normal(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
     m, at = case.measures, case.case
-    resolution = m.area_resolution
+    resolution, out = m.area_resolution, list[Result]()
+    if solution.curved:
+        radii = m.radius_moment, m.radius_area, m.radius_outermost
+        names = q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST
+        out += _beside(at, known, *zip(names, radii, strict=True))
+    out += _approach(case, known)
     rows = [
-        (q.APPROACH, case.approach),
         (_area(solution, q.CONTACT_AREA), m.area),
         (_area(solution, q.CONTACT_AREA_NODES), m.area_nodes),
         (q.MAX_PRESSURE, m.max_pressure),
         (q.MEAN_PRESSURE, m.mean_pressure),
     ]
-    if solution.curved:
-        radii = m.radius_moment, m.radius_area, m.radius_outermost
-        names = q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST
-        rows = [*zip(names, radii, strict=True), *rows]
     if resolution is not None:
         rows.append((_area(solution, q.CONTACT_AREA_RESOLUTION), resolution))
     if solution.plan.effect("friction"):
         stick = solution.area_of(case.stick)
         rows.append((_area(solution, q.STICK_AREA), stick))
-    out = _beside(at, known if resolution is None else _LOCATED, *rows)
+    out += _beside(at, known if resolution is None else _LOCATED, *rows)
     if not solution.curved:
         return out + _of_faces(solution, case)
-    out += _approach_split(case, known)
     hertz = solution.hertz_of(case.force)
     if hertz is not None:
         out.append(q.CLOSED_FORM_ERROR.of(hertz.approach**2 / hertz.radius**2, at))
-    return [_with_estimate(result, case) for result in out]
+    return out
 
 
 def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
@@ -201,44 +185,46 @@ def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
     return out
 
 
-def _with_estimate(result: Result, case: NormalCase) -> Result:
-    """The number with its estimated error where one mesh shows it: the approach."""
-    if result.name not in _OF_APPROACH or case.mesh_error is None:
-        return result
-    near, far = (abs(error) * q.APPROACH.scale / abs(result.value) for error in case.mesh_error)
-    parts = (
-        ErrorPart("mesh at the contact", near, _BETTI),
-        ErrorPart("mesh far away", far, _BETTI),
-    )
-    return with_parts(result, parts)
-
-
-def _approach_split(case: NormalCase, known: References) -> list[Result]:
-    """The approach less the bodies' share, and within depth 3a."""
-    if not case.shares:
-        return []
-    at = case.case
-    return [
-        *_beside(at, known, (q.APPROACH_CONTACT, case.approach - case.finite_body)),
-        q.APPROACH_FINITE_BODY.of(case.finite_body, at),
-        *_beside(at, known, (q.APPROACH_WITHIN_3A, _within_3a(case))),
-    ]
+def _approach(case: NormalCase, known: References) -> list[Result]:
+    """The approach, less the bodies' share, that share, and within depth 3a; with the estimated
+    error where one mesh shows it.
+    """
+    approach, bodies = case.solution.approach, case.finite_body
+    rows = [(q.APPROACH, approach)]
+    if case.shares:
+        rows += [(q.APPROACH_CONTACT, approach - bodies), (q.APPROACH_FINITE_BODY, bodies)]
+        rows.append((q.APPROACH_WITHIN_3A, _within_3a(case)))
+    out = _beside(case.case, known, *rows)
+    if case.mesh_error is not None:
+        # raw, and with the bulk compliance removed: one mesh's error is in both
+        for k, one in enumerate(out[:2]):
+            near, far = (abs(e) * q.APPROACH.scale / abs(one.value) for e in case.mesh_error)
+            parts = (
+                ErrorPart("mesh at the contact", near, _BETTI),
+                ErrorPart("mesh far away", far, _BETTI),
+            )
+            out[k] = with_parts(one, parts)
+    return out
 
 
 def _within_3a(case: NormalCase) -> float:
     """Approach within depth 3a, mm."""
-    return case.approach - sum(share.compression for share in case.shares.values())
+    return case.solution.approach - sum(share.compression for share in case.shares.values())
 
 
 # -- stiffness -------------------------------------------------------------------------------------
 
 
 def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
-    at, secant = case.case, case.force / (case.approach - _touch(solution))
+    # A secant counts from where the faces touch first; a gap that is left at the apex of a curved
+    # body is the lattice's, an overlap is the file's.
+    touch = solution.model.first_touch
+    touch = min(0.0, touch) if solution.curved else touch
+    at, secant = case.case, case.force / (case.solution.approach - touch)
     raw = (q.K_N_TANGENT_RAW, case.stiffness), (q.K_N_SECANT_RAW, secant)
     out = _beside(at, known, *raw)
     if not solution.curved:
-        return out + _stiffness_of_faces(solution, case)
+        return out + _stiffness_of_faces(solution, case, touch)
     bodies = case.finite_body / case.force
     K_N, rows = without_body(case.stiffness, bodies), list[tuple[Quantity, float]]()
     if case.shares:
@@ -246,7 +232,7 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
         # contact's (its section 6.5): 23 % of a half-space's displacement lies beyond 3a, so it is
         # 30 % above K_N by Hertz itself. On the coarsest meshes nothing is left within 3a.
         within = _within_3a(case)
-        if within > _ROUNDING * case.approach:
+        if within > _ROUNDING * case.solution.approach:
             rows.append((q.K_N_TANGENT_3A, 1.5 * case.force / within))
         rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, without_body(secant, bodies))]
     stuck = next((total for total, _ in case.stuck.values()), None)
@@ -258,27 +244,18 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
     return out + _beside(at, known, *rows)
 
 
-def _touch(solution: ContactSolution) -> float:
-    """Approach at which the faces touch first, which a secant counts from, mm.
-
-    A gap that is left at the apex of a curved body is the lattice's, an overlap is the file's.
-    """
-    touch = solution.model.first_touch
-    return min(0.0, touch) if solution.curved else touch
-
-
-def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
+def _stiffness_of_faces(solution: ContactSolution, case: NormalCase, touch: float) -> list[Result]:
     """Each body alone, along each direction; and of one pad where several share
     the contact: the total over their number.
 
     That is each pad's own when they carry equal forces; otherwise their mean.
     """
-    at, n, touch = case.case, len(solution.lattices), _touch(solution)
+    at, n = case.case, len(solution.lattices)
     out = [
         q.K_N_ALONE.of(case.force / (one.solution.approach - touch), at, n=body)
         for body, one in case.alone.items()
     ]
-    pads = [q.K_N_PER_PAD.of(case.force / (case.approach - touch) / n, at)]
+    pads = [q.K_N_PER_PAD.of(case.force / (case.solution.approach - touch) / n, at)]
     for direction, (total, of) in case.stuck.items():
         way = direction_name(direction)
         out.append(q.K_T_ALL_STUCK.of(total, at, n=way))

@@ -121,45 +121,6 @@ class Sheared:
     terms: Array | float = 0.0
 
 
-@dataclass(frozen=True)
-class CoupledState:
-    """A load step of coupled contact.
-
-    Attributes
-    ----------
-    found
-        Answers up to it; its own is the last.
-    before
-        (n, 2) slip before the step, mm.
-    """
-
-    found: CoupledContact
-    before: Array
-
-    @property
-    def force(self) -> Array:
-        """(n, 3) normal force, force along x and y, N."""
-        return np.asarray(self.found.force[-1])
-
-    @property
-    def motion(self) -> Array:
-        """(r,) approach, shifts along x and y in mm, free tilts in rad."""
-        return np.asarray(self.found.displacement[-1])
-
-    @property
-    def stick(self) -> NDArray[np.bool_]:
-        """(n,) nodes that stick."""
-        return np.asarray(self.found.state[-1] == STICK)
-
-    @property
-    def shear_stiffness(self) -> Array:
-        """(2, 2) dT/dd in N/mm with the normal load and the states kept; 0 where nothing holds."""
-        try:
-            return np.asarray(np.linalg.inv(np.linalg.inv(self.found.stiffness())[1:3, 1:3]))
-        except (ConvergenceError, np.linalg.LinAlgError):
-            return np.zeros((2, 2))
-
-
 @dataclass
 class NormalCase:
     """One normal load on the whole contact, of both bodies or of one pressed by a rigid
@@ -169,12 +130,14 @@ class NormalCase:
     ----------
     force
         N on the whole contact.
+    solution
+        Its approach is that of the distant sets.
     stiffness
         Tangent normal stiffness of the whole contact, N/mm.
     measures
         Size and pressure of the contact.
-    state
-        With normal and tangential contact at once, the state it comes from.
+    coupled
+        With normal and tangential contact at once, the load steps that end in it.
     tilt
         (2,) free tilts in rad; None where they are held.
     alone
@@ -197,7 +160,7 @@ class NormalCase:
     solution: NormalContact
     stiffness: float
     measures: ContactMeasures
-    state: CoupledState | None = None
+    coupled: CoupledContact | None = None
     tilt: Array | None = None
     alone: dict[str, NormalCase] = field(default_factory=dict)
     stuck: dict[float, tuple[float, dict[str, float]]] = field(default_factory=dict)
@@ -217,12 +180,7 @@ class NormalCase:
         """(n,) nodes that stick without a tangential load: all in contact, if pressure does not
         shear.
         """
-        return self.solution.contact if self.state is None else self.state.stick
-
-    @property
-    def approach(self) -> float:
-        """Of the distant sets, mm."""
-        return self.solution.approach
+        return self.solution.contact if self.coupled is None else self.coupled.state[-1] == STICK
 
     @property
     def finite_body(self) -> float:
@@ -241,7 +199,8 @@ class TangentialCase:
 
     Displacement in mm along it, and tangent dT/dd in N/mm of the whole contact at the present stick
     set. Force in N and slip in mm, (n, 1 or 2), normal forces under it (n,); what the solver left
-    at the nodes, for checks, and with normal and tangential contact at once its state.
+    at the nodes, for checks, and with normal and tangential contact at once the load steps up to
+    it.
     """
 
     normal: NormalCase
@@ -252,12 +211,13 @@ class TangentialCase:
     force: Array
     slip: Array
     nodes: Sheared
-    state: CoupledState | None = None
+    coupled: CoupledContact | None = None
 
     @property
     def pressed(self) -> Array:
         """(n,) normal forces under it, N."""
-        return self.normal.solution.force if self.state is None else self.state.force[:, 0]
+        coupled = self.coupled
+        return self.normal.solution.force if coupled is None else coupled.force[-1, :, 0]
 
     @property
     def stick(self) -> NDArray[np.bool_]:
@@ -534,9 +494,9 @@ def raised(
     arms: Array,
     *,
     body: Body | None = None,
-) -> dict[float, CoupledState]:
-    """States of the positive normal loads in N, each on the way to the next, without a tangential
-    load.
+) -> dict[float, CoupledContact]:
+    """Load steps to the positive normal loads in N, each on the way to the next, without a
+    tangential load.
 
     Parameters
     ----------
@@ -545,46 +505,30 @@ def raised(
     body
         Against a rigid counterpart; None: both.
     """
-    n, out = len(model.gap), {}
-    found: CoupledContact | None = None
-    at = 0.0
+    n, at, out = len(model.gap), 0.0, dict[float, CoupledContact]()
+    # approach, shifts along x and y, tilts
+    columns = np.zeros((3 * n, 3 + arms.shape[1]))
+    columns[:, :3], columns[:n, 3:] = np.kron(np.eye(3), np.ones((n, 1))), arms
     for F in sorted({load for load in loads if load > 0.0}):
-        steps = int(np.ceil(NORMAL_STEPS * (1.0 - at / F)))
-        way = np.zeros((steps, 3 + arms.shape[1]))
-        way[:, 0] = np.linspace(at, F, steps + 1)[1:]
-        before = np.zeros((n, 2)) if found is None else found.slip[-1]
-        if found is None:
-            # approach, shifts along x and y, tilts
-            columns = np.zeros((3 * n, 3 + arms.shape[1]))
-            columns[:, :3], columns[:n, 3:] = np.kron(np.eye(3), np.ones((n, 1))), arms
-            found = coupled_contact(
-                tangential_compliance(model, COMPONENTS, np.arange(n), body),
-                model.gap,
-                friction,
-                load=way,
-                columns=columns,
-            )
+        way = np.zeros((int(np.ceil(NORMAL_STEPS * (1.0 - at / F))), columns.shape[1]))
+        way[:, 0] = np.linspace(at, F, len(way) + 1)[1:]
+        if out:
+            out[F] = out[at].go_on(load=way)
         else:
-            found = found.go_on(load=way)
-        out[F] = CoupledState(found, found.slip[-2] if steps > 1 else before)
+            C = tangential_compliance(model, COMPONENTS, np.arange(n), body)
+            out[F] = coupled_contact(C, model.gap, friction, load=way, columns=columns)
         at = F
     return out
 
 
-def slope(states: dict[float, CoupledState], load: float) -> float:
-    """dF/d approach in N/mm while the normal load rises, tilts and shifts following."""
-    low, high = (states[load * (1.0 + s)] for s in (-LOAD_STEP, LOAD_STEP))
-    return 2.0 * LOAD_STEP * load / float(high.motion[0] - low.motion[0])
-
-
-def as_normal(state: CoupledState, stiffness: float) -> NormalContact:
-    """The normal part of a state."""
-    found, f = state.found, state.force[:, 0]
+def as_normal(found: CoupledContact, stiffness: float) -> NormalContact:
+    """The normal part of the last load step."""
+    f = found.force[-1, :, 0]
     return NormalContact(
         np.maximum(f, 0.0),
         np.maximum(found.gap[-1], 0.0),
         np.asarray(found.state[-1] > 0),
-        float(state.motion[0]),
+        float(found.displacement[-1, 0]),
         stiffness,
         int(found.iterations[-1]),
         "fallback" if found.fallbacks else "active set",
@@ -594,50 +538,46 @@ def as_normal(state: CoupledState, stiffness: float) -> NormalContact:
     )
 
 
-def opened_by_shear(model: ContactModel, state: CoupledState) -> Array:
+def opened_by_shear(model: ContactModel, found: CoupledContact) -> Array:
     """(n,) mm that the tangential forces open, C_nt t."""
-    f = state.force
-    return np.asarray(
-        sum(
-            (model.compliance(NORMAL, c) @ f[:, 1 + k] for k, c in enumerate((ALONG, ACROSS))),
-            np.zeros(len(f)),
-        )
-    )
+    shear = zip((ALONG, ACROSS), found.force[-1, :, 1:].T, strict=True)
+    return np.asarray(sum(model.compliance(NORMAL, c) @ t for c, t in shear))
 
 
-def shear_nodes(model: ContactModel, friction: float, state: CoupledState) -> Sheared:
-    """What a step left at the closed nodes: beside the slip before it stands the way that the
-    pressure alone moves them, C_tn f.
+def shear_nodes(model: ContactModel, friction: float, found: CoupledContact) -> Sheared:
+    """What the last step left at the closed nodes: beside the slip before it stands the way that
+    the pressure alone moves them, C_tn f.
     """
-    on = np.flatnonzero(state.found.state[-1] > 0)
-    f, axes = state.force, (ALONG, ACROSS)
+    on = np.flatnonzero(found.state[-1] > 0)
+    f, axes = found.force[-1], (ALONG, ACROSS)
     size = float(np.sqrt(np.diagonal(model.compliance(NORMAL))) @ np.abs(f[:, 0]))
-    before = [model.compliance(c, NORMAL) @ f[:, 0] + state.before[:, c] for c in axes]
+    slip = found.slip[-1] - found.history.step
+    before = [model.compliance(c, NORMAL) @ f[:, 0] + slip[:, c] for c in axes]
     return Sheared(
         axes,
         on,
         friction * f[on, 0],
         np.concatenate([f[on, 1], f[on, 2]]),
         np.concatenate([one[on] for one in before]),
-        state.motion[1:3],
-        state.found.load[-1, 1:3],
-        state.stick[on],
+        found.displacement[-1, 1:3],
+        found.load[-1, 1:3],
+        found.state[-1][on] == STICK,
         np.concatenate([np.sqrt(np.diagonal(model.compliance(c)))[on] * size for c in axes]),
     )
 
 
-def loads_along(base: CoupledState, values: Array, unit: Array) -> Array:
-    """The normal load of a state with tangential ones (k,) in N along ``unit`` (2,)."""
-    out = np.zeros((len(values), len(base.motion)))
-    out[:, 0] = base.found.load[-1, 0]
+def loads_along(base: CoupledContact, values: Array, unit: Array) -> Array:
+    """The normal load of the last step with tangential ones (k,) in N along ``unit`` (2,)."""
+    out = np.zeros((len(values), base.load.shape[1]))
+    out[:, 0] = base.load[-1, 0]
     out[:, 1:3] = np.outer(values, unit)
     return out
 
 
 def sheared(
-    base: CoupledState, values: Array, unit: Array, needed: float
-) -> tuple[list[CoupledState], Array]:
-    """Tangential loads (k,) in N along ``unit`` (2,), rising, from the state of a normal load.
+    base: CoupledContact, values: Array, unit: Array, needed: float
+) -> tuple[list[CoupledContact], Array]:
+    """Tangential loads (k,) in N along ``unit`` (2,), rising, after the last step of a normal load.
 
     Those above ``needed`` are there for a curve, which ends where the contact slides.
 
@@ -646,15 +586,13 @@ def sheared(
     states, displacement
         After each load, and (k,) mm along the direction since the normal load.
     """
-    now, states = base, []
+    states = [base]
     for T in values:
         try:
-            found = now.found.go_on(load=loads_along(base, np.array([T]), unit))
+            states.append(states[-1].go_on(load=loads_along(base, np.array([T]), unit)))
         except ConvergenceError:
             if needed >= T:
                 raise
             break
-        now = CoupledState(found, now.found.slip[-1])
-        states.append(now)
-    start = base.motion[1:3]
-    return states, np.array([(one.motion[1:3] - start) @ unit for one in states])
+    moved = [(one.displacement[-1, 1:3] - base.displacement[-1, 1:3]) @ unit for one in states[1:]]
+    return states[1:], np.array(moved)

@@ -18,13 +18,12 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.base import Resolved, keeping
 from upd.analyses.contact import plan as planned
-from upd.analyses.contact.bodies import learns, prepare, solve_inside
+from upd.analyses.contact.bodies import prepare, solve_inside
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import (
     LOAD_STEP,
     ContactSolution,
-    CoupledState,
     LoadPath,
     NormalCase,
     Sheared,
@@ -36,18 +35,18 @@ from upd.analyses.contact.solution import (
     raised,
     shear_nodes,
     sheared,
-    slope,
     tangential_compliance,
     tilt_arms,
 )
 from upd.contact import tangential_contact, tangential_path
 from upd.contact.checks import few_threads
+from upd.contact.coupled import CoupledContact
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_contact, normal_curve
-from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
+from upd.contact.products import KNOWN, KNOWN_STIFFNESS, learners, settled
 from upd.contact.tangential import TangentialPath
 from upd.contact.tilt import tilted_contact
-from upd.errors import InputError, UpdError
+from upd.errors import ConvergenceError, InputError, UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
 from upd.results import quantities as q
@@ -94,10 +93,17 @@ def solve_plan(
 
 def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     """Every normal load and the force-approach curve."""
-    plan = solution.plan
-    wanted = list(planned.normal_loads(plan.scene))
-    curve = _curve_loads(plan, max(wanted), solution.curved)
-    steps = (-LOAD_STEP, 0.0, LOAD_STEP) if _by_slope(solution) else ()
+    scene, curved = solution.plan.scene, solution.curved
+    wanted, curve = list(planned.normal_loads(scene)), list[float]()
+    top = max(wanted) if scene.loads.curve_to is None else scene.loads.curve_to
+    if scene.wants("curve") and top > 0.0:
+        shares = np.linspace(0.0, 1.0, scene.loads.curve_points + 1)[1:]
+        # of a curved contact evenly spaced in approach by Hertz's F ~ d^1.5
+        curve = [float(top * s) for s in (shares**1.5 if curved else shares)]
+    # Stiffnesses are slopes of the curve between loads a little below and above: with a curved gap
+    # a stiffness at one contact set moves in steps as nodes come into contact.
+    sloped = scene.wants("stiffness") if curved else scene.coupled
+    steps = (-LOAD_STEP, 0.0, LOAD_STEP) if sloped else ()
     around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
@@ -107,26 +113,6 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
             alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
                 case.alone[body.name] = alone[case.force]
-
-
-def _by_slope(solution: ContactSolution) -> bool:
-    """Whether stiffnesses are slopes of the curve between loads a little below and above: with a
-    curved gap a stiffness at one contact set moves in steps as nodes come into contact.
-    """
-    scene = solution.plan.scene
-    return scene.wants("stiffness") if solution.curved else scene.coupled
-
-
-def _curve_loads(plan: ContactPlan, largest: float, curved: bool) -> list[float]:
-    """Loads in N of the force-approach curve, those of a curved contact evenly spaced in approach
-    by Hertz's F ~ d^1.5.
-    """
-    loads = plan.scene.loads
-    top = largest if loads.curve_to is None else loads.curve_to
-    if not plan.scene.wants("curve") or not top > 0.0:
-        return []
-    shares = np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]
-    return [float(top * s) for s in (shares**1.5 if curved else shares)]
 
 
 def press(
@@ -145,12 +131,9 @@ def press(
     plan, model = solution.plan, solution.model
     distinct = sorted(set(forces))
     if plan.scene.coupled:
-        return _sheared_too(solution, distinct, body)
+        return _coupled(solution, distinct, body)
     loads, arms = [F / plan.copies for F in distinct], tilt_arms(plan, model)
-
-    def compliance() -> Array:
-        return model.compliance(NORMAL, body=body)
-
+    compliance = partial(model.compliance, NORMAL, body=body)
     if arms.size:
         free = (0 not in plan.mirrors, 1 not in plan.mirrors)
         tilted = [tilted_contact(compliance(), model.gap, arms, load=F, free=free) for F in loads]
@@ -169,11 +152,19 @@ def press(
         F: NormalCase(F, one, plan.copies * K, measured(solution, one, F), tilt=tilt)
         for F, (one, K, tilt) in zip(distinct, found, strict=True)
     }
-    for F in distinct if _by_slope(solution) else ():
-        ends = [out.get(F * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP)]
-        if F > 0.0 and ends[0] and ends[1]:
-            moved = ends[1].solution.approach - ends[0].solution.approach
-            out[F].stiffness = 2.0 * LOAD_STEP * F / moved
+    if solution.curved:
+        for F, K in _slopes({F: one.solution.approach for F, one in out.items()}).items():
+            out[F].stiffness = K
+    return out
+
+
+def _slopes(approach: Mapping[float, float]) -> dict[float, float]:
+    """dF/d approach in N/mm at the loads in N that have one a little below and one above."""
+    out = {}
+    for F in (F for F in approach if F > 0.0):
+        low, high = (approach.get(F * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP))
+        if low is not None and high is not None:
+            out[F] = 2.0 * LOAD_STEP * F / (high - low)
     return out
 
 
@@ -185,7 +176,7 @@ def _known(found: Sequence[NormalContact]) -> Iterator[tuple[Array, float]]:
             yield one.rates, KNOWN_STIFFNESS
 
 
-def _sheared_too(
+def _coupled(
     solution: ContactSolution, forces: Sequence[float], body: Body | None
 ) -> dict[float, NormalCase]:
     """The same with normal and tangential contact at once, the slope of the curve as the stiffness
@@ -194,21 +185,20 @@ def _sheared_too(
     model, mu = solution.model, solution.plan.scene.contact.friction
     arms = tilt_arms(solution.plan, model)
     states = raised(model, mu, forces, arms, body=body)
+    slopes = _slopes({F: float(found.displacement[-1, 0]) for F, found in states.items()})
     # no load: friction has nothing to hold
     out = {}
     for F in (F for F in forces if not F > 0.0):
         none = normal_contact(model.compliance(NORMAL), model.gap, load=0.0)
         out[F] = NormalCase(F, none, 0.0, measured(solution, none, F))
-    for F, state in states.items():
-        sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
-        free = slope(states, F) if sloped else float("nan")
-        held = free
-        if arms.size and sloped and body is None:
+    for F, found in states.items():
+        free = held = slopes.get(F, float("nan"))
+        if arms.size and F in slopes and body is None:
             # dF/d approach with the tilts held and the states kept, shifts following
-            held = float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
-        tilt = state.motion[3:] if arms.size else None
-        answer = as_normal(state, held)
-        out[F] = NormalCase(F, answer, free, measured(solution, answer, F), state, tilt)
+            held = float(1.0 / np.linalg.inv(found.stiffness()[:3, :3])[0, 0])
+        tilt = found.displacement[-1, 3:] if arms.size else None
+        answer = as_normal(found, held)
+        out[F] = NormalCase(F, answer, free, measured(solution, answer, F), found, tilt)
     return out
 
 
@@ -232,8 +222,11 @@ def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
         loaded = [case for case in solution.normal if case.solution.force.any()]
         # Twice: what one load teaches changes the answers of the others within the tolerance.
         # Nothing is learned afterwards, so that every result and check sees one compliance.
-        for case in 2 * loaded if learns(solution.model) else ():
-            Frozen(solution, case, 0.0).learn()
+        model, families = solution.model, solution.model.upper.condensed
+        learns = any(learners(model, components) for components in families)
+        for case in 2 * loaded if learns else ():
+            way = Shear(solution, case, 0.0)
+            settled(model, way.components, way.tractions, lambda found: found)
         for case in loaded:
             for direction in scene.loads.directions:
                 _sheared(solution, case, direction)
@@ -242,7 +235,7 @@ def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
 def _sheared(solution: ContactSolution, case: NormalCase, direction: float) -> None:
     """Stiffness, loads on one way, cycle of one direction after one normal load."""
     scene, curved = solution.plan.scene, solution.curved
-    way = (Frozen if case.state is None else _Coupled)(solution, case, direction)
+    way = Shear(solution, case, direction)
     # Flat faces share their law by the stuck contact.
     if not curved or scene.wants("stiffness"):
         case.stuck[direction] = way.stuck()
@@ -250,7 +243,7 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float) -> N
     shares = PATH_SHARES
     if curved:
         # Only where the pressure follows the shear does the way to a load matter.
-        shares = shares[max(loads, default=0.0) > shares] if case.state else shares[:0]
+        shares = shares[max(loads, default=0.0) > shares] if case.coupled else shares[:0]
     if scene.wants("tangential") and (loads or not curved):
         ratios = np.unique(np.concatenate([shares, loads]))
         load, moved, at = way.march(ratios)
@@ -262,11 +255,10 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float) -> N
         solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
 
 
-class Frozen:
-    """Tangential loads along a direction that leave the normal forces as they are."""
-
-    #: of a cycle
-    loops = 1
+class Shear:
+    """Tangential loads along a direction, which leave the normal forces as they are, or with normal
+    and tangential contact at once, where the pressure follows the shear.
+    """
 
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
         scene, force = solution.plan.scene, case.solution.force
@@ -280,25 +272,9 @@ class Frozen:
         self.limit = self.friction * force[self.loaded]
         #: mu N on the model
         self.total = self.friction * case.force / self.copies
-
-    def _found(
-        self,
-        ratio: float,
-        displacement: float,
-        K: Array,
-        fields: tuple[Array, Array],
-        nodes: Sheared,
-        state: CoupledState | None = None,
-    ) -> TangentialCase:
-        """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
-        # with the motion across the load free to follow; 0 where nothing holds
-        free = np.linalg.pinv(K, hermitian=True)
-        tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
-        case = self.solution.sheared_case(self.case, self.direction, ratio)
-        load = ratio * self.friction * self.case.force
-        return TangentialCase(
-            self.case, case, load, displacement, self.copies * tangent, *fields, nodes, state
-        )
+        #: of a cycle; the first of coupled contact does not close: shear settles what the pressure
+        #: left, and the approach with it
+        self.loops = 1 if case.coupled is None else 2
 
     @property
     def compliance(self) -> Array:
@@ -311,69 +287,112 @@ class Frozen:
         t = cho_solve(cho_factor(compliance), e)
         return t, self.copies * float(e @ t)
 
+    def _secant(self, base: CoupledContact) -> float:
+        """Of a small tangential load of coupled contact, N/mm."""
+        size = SMALL_SHEAR * self.friction * float(base.load[-1, 0])
+        return size / float(sheared(base, np.array([size]), self.unit, size)[1][0])
+
     def stuck(self) -> tuple[float, dict[str, float]]:
         """Stiffness of the stuck contact set, of both bodies and of each on a rigid counterpart."""
         model, of = self.solution.model, {}
         for body in (model.upper, model.lower):
-            if body.name in self.case.alone:
-                on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
+            alone = self.case.alone.get(body.name)
+            if alone is not None and alone.coupled is not None:
+                of[body.name] = self._secant(alone.coupled)
+            elif alone is not None:
+                on = np.flatnonzero(alone.solution.force > 0.0)
                 C = tangential_compliance(model, self.components, on, body)
                 of[body.name] = self._moved(C)[1]
-        return self._moved(self.compliance)[1], of
+        both = self.case.coupled
+        return self._moved(self.compliance)[1] if both is None else self._secant(both), of
 
-    def _path(self, shares: Array) -> TangentialPath:
-        """Shares of mu N one after the other, from no slip."""
-        values = shares * self.total
-        loads = np.outer(values, self.unit) if len(self.unit) == 2 else values
-        return tangential_path(self.compliance, self.limit, loads=loads)
-
-    def _along(self, path: TangentialPath) -> tuple[Array, Array]:
-        """Load of the whole contact in N and displacement in mm along the direction, from zero
-        on.
+    def _path(self, shares: Array) -> tuple[Array, Array, TangentialPath]:
+        """Shares of mu N one after the other, from no slip, under frozen normal forces: load of the
+        whole contact in N and displacement in mm along the direction, from zero on.
         """
-        shape = len(path.load), len(self.unit)
-        load, moved = (v.reshape(shape) @ self.unit for v in (path.load, path.displacement))
-        return np.insert(self.copies * load, 0, 0.0), np.insert(moved, 0, 0.0)
+        values, k = shares * self.total, len(self.unit)
+        loads = np.outer(values, self.unit) if k == 2 else values
+        path = tangential_path(self.compliance, self.limit, loads=loads)
+        load, moved = (v.reshape(-1, k) @ self.unit for v in (path.load, path.displacement))
+        return np.insert(self.copies * load, 0, 0.0), np.insert(moved, 0, 0.0), path
 
     def march(self, ratios: Array) -> Marched:
-        """Shares of mu N one after the other."""
-        path = self._path(ratios)
-        return *self._along(path), partial(self._at, path)
+        """Shares of mu N one after the other; coupled contact remembers the normal load."""
+        if self.case.coupled is None:
+            load, moved, path = self._path(ratios)
+            return load, moved, partial(self._frozen_case, path)
+        needed = max(self.loads.tangential, default=0.0) * self.total
+        values = ratios * self.total
+        states, moved = sheared(self.case.coupled, values, self.unit, needed)
+        load, moved = (np.insert(v, 0, 0.0) for v in (values[: len(states)], moved))
+        return load, moved, partial(self._coupled_case, states, moved)
 
-    def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
+    def _frozen_case(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
         before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
         d, stick = np.atleast_1d(path.displacement[k]), path.state[k] == 0
         load, force = ratio * self.total * self.unit, path.unclipped[k]
         nodes = Sheared(self.components, self.loaded, self.limit, force, before, d, load, stick)
-        fields = self._spread(path.force[k]), self._spread(path.slip[k])
+        fields = np.zeros((2, len(self.solution.model.gap), len(self.unit)))
+        for field, values in zip(fields, (path.force[k], path.slip[k]), strict=True):
+            field[self.loaded] = values.reshape(len(self.unit), -1).T
         K = np.atleast_2d(path.stiffness[k])
-        return self._found(ratio, float(d @ self.unit), K, fields, nodes)
+        return self._found(ratio, float(d @ self.unit), K, (fields[0], fields[1]), nodes)
 
-    def loop(self, shares: Array) -> tuple[Array, Array, Array]:
-        """Load in N and displacement in mm along the direction, from zero on, and the work of slip
-        in each step, N mm.
-        """
-        path = self._path(shares)
-        return *self._along(path), self.copies * path.slip_work
+    def _coupled_case(
+        self, states: list[CoupledContact], moved: Array, k: int, ratio: float
+    ) -> TangentialCase:
+        found = states[k]
+        nodes = shear_nodes(self.solution.model, self.friction, found)
+        slip = np.zeros((len(found.force[-1]), 2))
+        slip[nodes.loaded] = found.slip[-1][nodes.loaded]
+        K = np.zeros((2, 2))
+        # nothing holds where there is no inverse
+        with suppress(ConvergenceError, np.linalg.LinAlgError):
+            # with the normal load and the states kept
+            K = np.linalg.inv(np.linalg.inv(found.stiffness())[1:3, 1:3])
+        fields = found.force[-1, :, 1:], slip
+        return self._found(ratio, float(moved[k + 1]), K, fields, nodes, found)
+
+    def _found(
+        self,
+        ratio: float,
+        displacement: float,
+        K: Array,
+        fields: tuple[Array, Array],
+        nodes: Sheared,
+        coupled: CoupledContact | None = None,
+    ) -> TangentialCase:
+        """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
+        # with the motion across the load free to follow; 0 where nothing holds
+        free = np.linalg.pinv(K, hermitian=True)
+        tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
+        case = self.solution.sheared_case(self.case, self.direction, ratio)
+        load = ratio * self.friction * self.case.force
+        return TangentialCase(
+            self.case, case, load, displacement, self.copies * tangent, *fields, nodes, coupled
+        )
 
     def cycle(self, case: Case) -> LoadPath:
         """First loading to +T*, then closed loops +T* -> -T* -> +T*, of which the last counts."""
         shares, first, steps = cycle_shares(self.loads.cycle_steps, self.loops)
-        T, d, work = self.loop(self.loads.cycle_amplitude * shares)
+        shares, base = self.loads.cycle_amplitude * shares, self.case.coupled
+        if base is None:
+            T, d, path = self._path(shares)
+            work = self.copies * path.slip_work
+        else:
+            values = shares * self.total
+            found = base.go_on(load=loads_along(base, values, self.unit))
+            moved = (found.displacement[:, 1:3] - base.displacement[-1, 1:3]) @ self.unit
+            T, d = np.insert(values, 0, 0.0), np.insert(moved, 0, 0.0)
+            work = found.friction_loss(base.history)
         area = abs(float(np.trapezoid(T[-steps - 1 :], d[-steps - 1 :])))
         slip_work = work[first:].reshape(self.loops, steps).sum(axis=1)
         return LoadPath(case, T, d, True, float(slip_work[-1]), area, float(slip_work.max()))
 
-    def learn(self) -> None:
-        """Show bodies that learn the tractions of every tangential load and of the cycle.
-
-        Raises ConvergenceError where a product does not converge.
-        """
-        settled(self.solution.model, self.components, self._tractions, lambda found: found)
-
-    def _tractions(self) -> list[tuple[Array, float]]:
-        """Tractions on all nodes, column by column, and the largest share of them that may be
-        unknown: stuck, in gross slip, of every load with its rates, of the cycle.
+    def tractions(self) -> list[tuple[Array, float]]:
+        """Tractions of every tangential load and of the cycle, which bodies learn: on all nodes,
+        column by column, and the largest share of them that may be unknown: stuck, in gross slip,
+        of every load with its rates, of the cycle.
         """
         scene, C = self.solution.plan.scene, self.compliance
         gross = np.zeros(len(C))
@@ -388,7 +407,7 @@ class Frozen:
             found += [(one.rates, KNOWN_STIFFNESS)] if one.rates is not None else []
         if scene.wants("cycle"):
             shares, *_ = cycle_shares(self.loads.cycle_steps, self.loops)
-            found.append((self._path(self.loads.cycle_amplitude * shares).force.T, KNOWN))
+            found.append((self._path(self.loads.cycle_amplitude * shares)[2].force.T, KNOWN))
         n = len(self.solution.model.gap)
         at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
         out = []
@@ -397,57 +416,6 @@ class Frozen:
             whole[at] = tractions
             out.append((whole, limit))
         return out
-
-    def _spread(self, values: Array) -> Array:
-        """(n, 1 or 2) of values at the loaded nodes."""
-        out = np.zeros((len(self.solution.model.gap), len(self.unit)))
-        out[self.loaded] = values.reshape(len(self.unit), len(self.loaded)).T
-        return out
-
-
-class _Coupled(Frozen):
-    """The same with normal and tangential contact at once: the pressure follows the shear."""
-
-    #: the first does not close: shear settles what the pressure left, and the approach with it
-    loops = 2
-
-    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
-        super().__init__(solution, case, direction)
-        assert case.state is not None
-        self.state = case.state
-
-    def stuck(self) -> tuple[float, dict[str, float]]:
-        """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
-
-        def secant(state: CoupledState) -> float:
-            size = SMALL_SHEAR * self.friction * float(state.found.load[-1, 0])
-            return size / float(sheared(state, np.array([size]), self.unit, size)[1][0])
-
-        alone = {name: one.state for name, one in self.case.alone.items()}
-        of = {name: secant(state) for name, state in alone.items() if state is not None}
-        return secant(self.state), of
-
-    def march(self, ratios: Array) -> Marched:
-        """Shares of mu N one after the other; friction remembers the normal load."""
-        needed = max(self.loads.tangential, default=0.0) * self.total
-        states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
-        load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
-        return load, np.insert(moved, 0, 0.0), partial(self._to, states, moved)
-
-    def _to(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
-        state = states[k]
-        nodes = shear_nodes(self.solution.model, self.friction, state)
-        slip = np.zeros((len(state.force), 2))
-        slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
-        fields = state.force[:, 1:], slip
-        return self._found(ratio, float(moved[k]), state.shear_stiffness, fields, nodes, state)
-
-    def loop(self, shares: Array) -> tuple[Array, Array, Array]:
-        """The same; friction remembers the normal load."""
-        values, before = shares * self.total, self.state.found.history
-        found = self.state.found.go_on(load=loads_along(self.state, values, self.unit))
-        moved = (found.displacement[:, 1:3] - before.motion[1:3]) @ self.unit
-        return np.insert(values, 0, 0.0), np.insert(moved, 0, 0.0), found.friction_loss(before)
 
 
 # -- effects left out ------------------------------------------------------------------------------
@@ -477,28 +445,24 @@ _SWITCHES: Mapping[str, tuple[str, object]] = {
 
 
 def solve_left_out(solution: ContactSolution, stages: Stages) -> None:
-    """Numbers again with the effects that the plan leaves out."""
-    companion = solution.plan.companion
-    if companion is not None:
-        with stages("effects left out", "on a coarser whole model"):
-            solution.left_out += _left_out(solution, companion)
-
-
-def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Resolved]:
-    """Every number that shows what an effect left out changes."""
-    without, model = _under_load(make_results(solution)), None
-    with suppress(UpdError):
-        model = prepare(companion, Stages(), "companion")
-        without = _numbers(companion, model)
-    for effect in solution.plan.shown:
-        included, tips = dict[Key, float](), False
-        try:
-            if model is not None:
-                found = _numbers(companion, model, _SWITCHES[effect])
-                included = {(r.name, r.case): r.value for r in found}
-        except (UpdError, np.linalg.LinAlgError) as error:
-            tips = isinstance(error, InputError)
-        yield from _changes(effect, without, included, tips=tips)
+    """Every number that shows what an effect left out changes, again with it."""
+    companion, model = solution.plan.companion, None
+    if companion is None:
+        return
+    with stages("effects left out", "on a coarser whole model"):
+        without = _under_load(make_results(solution))
+        with suppress(UpdError):
+            model = prepare(companion, Stages(), "companion")
+            without = _numbers(companion, model)
+        for effect in solution.plan.shown:
+            included, tips = dict[Key, float](), False
+            try:
+                if model is not None:
+                    found = _numbers(companion, model, _SWITCHES[effect])
+                    included = {(r.name, r.case): r.value for r in found}
+            except (UpdError, np.linalg.LinAlgError) as error:
+                tips = isinstance(error, InputError)
+            solution.left_out += _changes(effect, without, included, tips=tips)
 
 
 def _changes(

@@ -227,9 +227,10 @@ def levels(plan: ContactPlan) -> Levels:
     return {MESH: [replace(one, size=one.size / own) for one in made] or _COARSEST}
 
 
-def governing(scene: Scene) -> tuple[str, ...]:
+def governing(scene: Scene) -> dict[str, str]:
     """Names of the numbers (shell patterns) that one accuracy for all is asked of."""
-    return CURVED_GOVERNING if is_curved(scene) else FLAT_GOVERNING
+    names = CURVED_GOVERNING if is_curved(scene) else FLAT_GOVERNING
+    return {name: name for name in names}
 
 
 def choices(scene: Scene) -> list[LevelChoice]:
@@ -268,8 +269,16 @@ def _flat_levels(scene: Scene) -> dict[int, Overrides]:
             f"accuracy: the recipe {scene.recipe!r} has no divisions to choose; leave it out"
         )
     element = _ELEMENT if scene.mesh.element in ("hex8", "hex8i") else scene.mesh.element
-    wires = recipes.has_parameter(scene.recipe, "bottom_layer")
-    geometry = _for_wires(scene.geometry) if wires else scene.geometry
+    wires, geometry = recipes.has_parameter(scene.recipe, "bottom_layer"), scene.geometry
+    if wires:
+        # half of its divisions across, and thin elements under the wires
+        under = geometry.get("bottom_layer")
+        geometry = {
+            **geometry,
+            "divisions": 2 * max(1, round(0.25 * geometry["divisions"])),
+            "bottom_layer": _UNDER_WIRES if under is None else under,
+            "first_layer": min(_AT_CONTACT, geometry["first_layer"]),
+        }
     usual, fewest = geometry["divisions"], 2 if wires else FEWEST
     shares = _SHARES_OF_WIRES if wires else _SHARES
     found: dict[int, Overrides] = {}
@@ -277,21 +286,6 @@ def _flat_levels(scene: Scene) -> dict[int, Overrides]:
         own = level_geometry(geometry, n, step=1 if wires else 2)
         found[n] = (("mesh.element", element), ("geometry", {**geometry, **own}))
     return found
-
-
-def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
-    """The geometry with half of its divisions across, and thin elements under the wires."""
-    under = geometry.get("bottom_layer")
-    return {
-        **geometry,
-        "divisions": 2 * max(1, round(0.25 * geometry["divisions"])),
-        "bottom_layer": _UNDER_WIRES if under is None else under,
-        "first_layer": min(_AT_CONTACT, geometry["first_layer"]),
-    }
-
-
-def level_of(plan: ContactPlan) -> Variation:
-    return _on_mesh(MESH, plan, {})
 
 
 def finer(plan: ContactPlan, source: str, factor: float) -> Overrides:
@@ -394,8 +388,8 @@ PROBLEM = Problem(
     finer,
     sample,
     choices=choices,
-    governing=lambda scene: {name: name for name in governing(scene)},
-    level_of=level_of,
+    governing=governing,
+    level_of=lambda plan: _on_mesh(MESH, plan, {}),
     predicted=_PREDICTED,
 )
 
@@ -447,17 +441,15 @@ def _on_meshes(make: Maker, applies: Callable[[Scene], bool] = lambda scene: Tru
 
     def variations(scene: Scene, asked: Asked) -> Iterable[Variation]:
         plan = plan_wanted(PROBLEM, scene)
-        divisions = whole_levels(asked, 4, "even numbers of divisions", step=2) or _usual(plan)
+        divisions: Sequence[int] = whole_levels(asked, 4, "even numbers of divisions", step=2)
+        if not divisions and is_curved(scene):
+            divisions = _DIVISIONS
+        elif not divisions:
+            usual = int(plan.parameters["divisions"])
+            divisions = tuple(dict.fromkeys(even(share * usual) for share in _STUDY_SHARES))
         return dict.fromkeys(make(plan, divisions))
 
     return Ladder(variations, _NUMBERS, applies=applies)
-
-
-def _usual(plan: Plan[Any]) -> Sequence[int]:
-    if is_curved(plan.scene):
-        return _DIVISIONS
-    usual = int(plan.parameters["divisions"])
-    return tuple(dict.fromkeys(even(share * usual) for share in _STUDY_SHARES))
 
 
 def _meshes(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
@@ -516,29 +508,23 @@ def parameter_points(scene: Scene, asked: Asked = None) -> list[Variation]:
     the scene leaves the mesh to an accuracy.
     """
     no_levels(asked, "a parameter study changes one parameter at a time")
-    plan = plan_wanted(PROBLEM, scene)
-    return [
-        Variation("parameters", label, overrides, 1.0) for label, overrides in _setups(scene, plan)
-    ]
-
-
-def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
-    yield "as given", ()
+    plan, found = plan_wanted(PROBLEM, scene), list[tuple[str, Overrides]]([("as given", ())])
     for name, factors in _FACTORS.items():
         length = plan.parameters.get(name)
         for value in (factor * length for factor in factors if isinstance(length, float)):
-            yield f"{name} {value:g} mm", _lengths({name: value})
+            found.append((f"{name} {value:g} mm", _lengths({name: value})))
     for body, mesh in recipes.build_mesh(scene.recipe, plan.parameters)[0].items():
         for key, nodes in mesh.nodes.items():
             name = key.removeprefix("distant_")
             # fewer than three nodes leave a body free to turn
             if name not in (key, scene.contact.distant.get(body)) and len(nodes) > 2:
-                yield f"{body} held at {name}", ((f"contact.distant.{body}", name),)
+                found.append((f"{body} held at {name}", ((f"contact.distant.{body}", name),)))
     other = "free" if scene.contact.tilt == "held" else "held"
-    yield f"tilt {other}", (("contact.tilt", other),)
+    found.append((f"tilt {other}", (("contact.tilt", other),)))
     # The normal force goes with the friction when it comes from an equilibrium.
-    for mu in (m for m in (0.3, 1.0) if m != scene.contact.friction):
-        yield f"mu = {mu:g}", (("contact.friction", mu),)
+    others = (mu for mu in (0.3, 1.0) if mu != scene.contact.friction)
+    found += [(f"mu = {mu:g}", (("contact.friction", mu),)) for mu in others]
+    return [Variation("parameters", label, overrides, 1.0) for label, overrides in found]
 
 
 def _lengths(values: Mapping[str, float]) -> Overrides:
@@ -572,7 +558,7 @@ LADDERS: Mapping[str, Ladder] = {
     "steps": Ladder(_STEPS, _NUMBERS, finest_report, applies=lambda scene: scene.coupled),
     "accuracy": Ladder(
         _accuracies,
-        report=lambda scene, solved, names: accuracy_report(scene, solved, governing(scene)),
+        report=lambda scene, solved, names: accuracy_report(scene, solved, [*governing(scene)]),
         notes=lambda scene: _ACCURACY_NOTES,
     ),
     "patch": _on_meshes(_patches, is_curved),
