@@ -14,7 +14,7 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures, performance
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, Limit, LinearCurves, faces_limit, point_limit
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, faces_limit, point_limit
 from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
@@ -109,12 +109,16 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
     between their points by straight lines.
     """
     side, e, stuck = choice.blade, solution.plan.scene.excitation, choice.state == STUCK
-    moves = stuck or (choice.state == FREE and side in excitation_of(e).free_blades)
+    excitation = excitation_of(e)
+    moves = stuck or (choice.state == FREE and side in excitation.free_blades)
     for name, linear in solution.linear.items() if moves else ():
         peaks = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
         case = Case(stiffness=name, kind=choice.state or "", blade=side)
-        read = partial(_limit(solution, name, stuck).accelerance, side)
-        yield Computed(case, (e.start, e.stop), read, peaks)
+        if name in solution.faces:
+            limit = faces_limit(solution.faces[name].march, excitation, e.stop, stuck)
+        else:
+            limit = point_limit(solution.plan, solution.models[name], stuck)
+        yield Computed(case, (e.start, e.stop), partial(limit.accelerance, side), peaks)
     # as the labels of curves tell them apart
     wanted = "" if choice.state else f"{choice.centrifugal_to_force:.6g}"
     for c in solution.curves:
@@ -124,14 +128,6 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             band, case = (float(f.min()), float(f.max())), replace(c.case, blade=side)
             read = partial(on_path, frequency=f, values=H)
             yield Computed(case, band, read, c.peaks.get(side, ()))
-
-
-def _limit(solution: ForcedSolution, name: str, stuck: bool) -> Limit:
-    """Blades free or stuck, exact at any frequency."""
-    plan, e = solution.plan, solution.plan.scene.excitation
-    if name in solution.faces:
-        return faces_limit(solution.faces[name].march, excitation_of(e), e.stop, stuck)
-    return point_limit(plan, solution.models[name], stuck)
 
 
 # -- the contact ----------------------------------------------------------------------------------
