@@ -388,32 +388,29 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
         latter what the contact does at its peaks), "performance", every "nonlinear mode", and every
         "measured curve".
     """
-    out: dict[str, Group] = {}
-    scene = solution.plan.scene
-
-    def add(content: str, case: Case | str, variables: Variables) -> None:
-        """A group of a case, or of a stiffness."""
-        mine = case if isinstance(case, Case) else Case(stiffness=case)
-        out[f"{content} {case}"] = Group(variables, content=content, case=mine)
-
+    scene, found = solution.plan.scene, list[tuple[str, Case, Variables]]()
     for name in (*solution.models, *(solution.faces if scene.wants("contact_state") else ())):
-        add(POINTS, name, _points(solution, name))
+        found.append((POINTS, Case(stiffness=name), _points(solution, name)))
     for name, linear in solution.linear.items():
-        add(LINEAR, name, _linear_arrays(solution, linear))
+        found.append((LINEAR, Case(stiffness=name), _linear_arrays(solution, linear)))
     for curve in (c for c in solution.curves if not c.empty):
         contact, peaks = contact_of(solution, curve), _curve_arrays(curve)
         behind = {} if contact is None else _contact_arrays(solution, curve, contact)
         if not curve.way:
-            add(FRICTION, curve.case, peaks | behind)
+            found.append((FRICTION, curve.case, peaks | behind))
             continue
-        add(SWEEP, curve.case, peaks)
+        found.append((SWEEP, curve.case, peaks))
         if contact is not None:
             behind["frequency"] = variable("frequency", contact.frequency, "Hz")
-            add(MARCHED, curve.case, behind)
-    for name, found in solution.performances.items():
-        add(PERFORMANCE, name, performance.performance_arrays(found))
+            found.append((MARCHED, curve.case, behind))
+    for name, one in solution.performances.items():
+        found.append((PERFORMANCE, Case(stiffness=name), performance.performance_arrays(one)))
     for mode in solution.nonlinear_modes:
-        add(MODES, mode.case, performance.mode_arrays(mode))
+        found.append((MODES, mode.case, performance.mode_arrays(mode)))
+    out = {
+        f"{content} {case}": Group(variables, content=content, case=case)
+        for content, case, variables in found
+    }
     return out | (measured.measured_arrays(scene.measured) if out else {})
 
 
