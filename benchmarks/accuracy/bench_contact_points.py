@@ -20,7 +20,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1]))
 from rig_response import rig
 
-from upd.analyses.forced.again import OFF_CONTACT, count_of
+from upd.analyses.forced.again import OFF_CONTACT, times
 from upd.analyses.forced.again import graded as graded_mesh
 from upd.analyses.forced.curves import linear_of
 from upd.scene import load_scene
@@ -76,7 +76,7 @@ def points() -> Iterator[Row]:
 def elements() -> Iterator[Row]:
     """The free in-phase frequency."""
     scene = load_scene("symmetric-response")
-    own = {key: count_of(scene, key) for key in OFF_CONTACT}
+    own = {key: n for key, n in times(scene, 1.0).items() if key in OFF_CONTACT}
     cases = {"own counts": {}}
     cases |= {f"twice {key} ({2 * n})": {key: 2 * n} for key, n in own.items()}
     cases |= {f"all counts x {n}": {key: n * one for key, one in own.items()} for n in (2, 3)}

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 from rigs import LINES
 
-from upd.analyses.forced.again import GRADED, OFF_CONTACT, count_of, graded
+from upd.analyses.forced.again import GRADED, OFF_CONTACT, graded, times
 from upd.analyses.forced.varied import PROBLEM, choices
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
@@ -43,8 +42,8 @@ def test_graded_meshes_are_nearer_to_the_limit_with_fewer_dofs() -> None:
     """A stiffer mesh has the higher frequency: finer ones, graded far more, tend to 292.4 Hz."""
     scene = _scene(**GAUSS)
     found, few = _free(scene, graded(scene, 1))
-    counts = (*OFF_CONTACT, "patch_along_slope")
-    even, many = _free(scene, {key: math.ceil(1.5 * count_of(scene, key)) for key in counts})
+    counts = {key: n for key, n in times(scene, 1.5).items() if key != "patch_along_y"}
+    even, many = _free(scene, counts)
     finer, _ = _free(scene, graded(scene, 1.5))
     assert few < 0.6 * many
     assert finer < 293.0 < found < even < 294.0

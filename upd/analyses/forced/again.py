@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
@@ -89,19 +88,19 @@ class Variant(NamedTuple):
         With it.
     model
         The changed model; None where the run's own is solved with other harmonics or samples.
-    seconds
-        That making the model took.
+    reason
+        Why it is not solved.
     """
 
     of: Variation
     plan: ForcedPlan
     model: Model | None = None
-    seconds: float = 0.0
+    reason: str = ""
 
 
 def make_variant(
     plan: ForcedPlan, name: str, base: Model, bodies: Bodies | None, of: Variation
-) -> Variant | SolvedVariation:
+) -> Variant:
     """The model of a variation with the sliding directions and the static state of the run's; why
     there is none.
 
@@ -114,9 +113,9 @@ def make_variant(
     bodies
         Of the run; None: they are meshed again.
     """
-    begin, fixed = time.perf_counter(), "one" if base.contacts.tangents < 2 else "two"
+    fixed = "one" if base.contacts.tangents < 2 else "two"
     if not of.overrides:
-        return SolvedVariation(of, reason="the mesh has no such level")
+        return Variant(of, plan, reason="the mesh has no such level")
     try:
         scene = changed(plan.scene, (("contact.directions", fixed), *of.overrides))
         other = replace(plan, scene=scene, parameters=parameters_of(scene), workers=1)
@@ -127,16 +126,15 @@ def make_variant(
         model = make_model(other, bodies or make_bodies(other), laws, state)
     except UpdError as error:
         log.info("%s, %s: %s", of.source, of.label, one_line(error))
-        return SolvedVariation(of, reason=one_line(error))
-    return Variant(of, other, model, time.perf_counter() - begin)
+        return Variant(of, plan, reason=one_line(error))
+    return Variant(of, other, model)
 
 
-def solve_again(run: Run, variant: Variant | SolvedVariation) -> SolvedVariation:
+def solve_again(run: Run, variant: Variant) -> SolvedVariation:
     """The numbers of the run's peaks with one thing changed; a fault becomes its reason."""
-    if isinstance(variant, SolvedVariation):
-        return variant
-    of, begin = variant.of, time.perf_counter() - variant.seconds
-    model, numbers = variant.model or run.model, list[Result]()
+    of, model, numbers = variant.of, variant.model or run.model, list[Result]()
+    if variant.reason:
+        return SolvedVariation(of, reason=variant.reason)
     other = run._replace(plan=variant.plan, model=model)
     with threads_for(len(model.M)):
         if variant.model is not None:
@@ -144,7 +142,7 @@ def solve_again(run: Run, variant: Variant | SolvedVariation) -> SolvedVariation
             numbers += limit_results(run.name, other.linear)
         for curve in run.curves:
             numbers += _changes(run, other, curve, of)
-    return SolvedVariation(of, numbers, time.perf_counter() - begin)
+    return SolvedVariation(of, numbers)
 
 
 # -- numbers ---------------------------------------------------------------------------------------
@@ -269,17 +267,13 @@ def expected(own: LinearCurves, other: LinearCurves, top: Top, number: int) -> f
     and of the stuck mode by where the peak lies.
     """
     stuck, again = (stuck_frequency(one.modes, number % 2 == 1) for one in (own, other))
-    start, free = (_free(one) for one in (own, other))
+    # the lowest free peaks
+    peaks = (one.free_peaks["right"] or one.free_peaks["left"] for one in (own, other))
+    start, free = (found[0].frequency if found else math.nan for found in peaks)
     if not math.isfinite(stuck + again + start + free) or stuck == start:
         return again / stuck if math.isfinite(again / stuck) else 1.0
     share = min(max((top.frequency - start) / (stuck - start), 0.0), 1.0)
     return free / start + share * (again / stuck - free / start)
-
-
-def _free(linear: LinearCurves) -> float:
-    """The lowest free peak in Hz; nan without."""
-    found = linear.free_peaks["right"] or linear.free_peaks["left"]
-    return found[0].frequency if found else math.nan
 
 
 # -- levels ----------------------------------------------------------------------------------------
@@ -418,31 +412,29 @@ def _contact_levels(contact: FrictionChoice) -> list[Variation]:
 # -- numbers of elements ---------------------------------------------------------------------------
 
 
-def count_of(scene: ForcedScene, key: str) -> int:
-    """A number of elements, as the scene or the recipe gives it."""
-    default = recipes.parameters(scene.recipe).__dataclass_fields__[key].default
-    return int(scene.geometry.get(key, default))
+def times(
+    scene: ForcedScene, factor: float, base: Mapping[str, int] | None = None
+) -> dict[str, int]:
+    """So many times the counts that its mesh is refined by, rounded up to those that the recipe
+    allows: on the contact too, where the contact points are none of its nodes.
 
-
-def meshed(scene: ForcedScene) -> list[str]:
-    """Counts that its mesh is refined by: on the contact too, where the contact points are none of
-    its nodes.
+    Parameters
+    ----------
+    base
+        Counts in place of the recipe's defaults.
     """
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
     on = _ON_CONTACT[scene.arrangement] if scene.contact.rule == GAUSS else ()
-    return [key for key in GRADED if key in OFF_CONTACT or key.startswith(on)]
-
-
-def _rounded(scene: ForcedScene, key: str, count: float) -> int:
-    """A number of elements up to one that the recipe allows."""
-    field = recipes.parameters(scene.recipe).__dataclass_fields__[key]
-    step = 2 if field.metadata["bounds"].even else 1
-    # up to rounding in the product
-    return step * max(1, math.ceil(round(count / step, 9)))
-
-
-def times(scene: ForcedScene, factor: float) -> dict[str, int]:
-    """So many times the counts, rounded up to those the recipe allows, as its parameters."""
-    return {key: _rounded(scene, key, factor * count_of(scene, key)) for key in meshed(scene)}
+    out = {}
+    for key in (key for key in GRADED if key in OFF_CONTACT or key.startswith(on)):
+        default = int(known[key].default)
+        count = factor * int(scene.geometry.get(key, default))
+        if base is not None:
+            count *= base[key] / default
+        step = 2 if known[key].metadata["bounds"].even else 1
+        # up to rounding in the product
+        out[key] = step * max(1, math.ceil(round(count / step, 9)))
+    return out
 
 
 def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:
@@ -465,19 +457,15 @@ def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:
     Returns
     -------
     dict
-        Counts, those on the contact where it is refined too (`meshed`), and growths.
+        Counts, those on the contact where it is refined too (`times`), and growths.
 
     References
     ----------
     .. [1] I. Babuska, R. B. Kellogg, J. Pitkaranta, Numer. Math. 33 (1979) 447.
     .. [2] M. L. Williams, J. Appl. Mech. 19 (1952) 526.
     """
-    known = recipes.parameters(scene.recipe).__dataclass_fields__
     order = 1 if NODES[scene.mesh.element] == 8 else 2
-    out: dict[str, Any] = {}
-    for key in meshed(scene):
-        own = count_of(scene, key) / int(known[key].default)
-        out[key] = _rounded(scene, key, factor * GRADED[key] * own)
+    out: dict[str, Any] = {**times(scene, factor, GRADED)}
     for name, n in (("growth", _OUTSIDE), ("growth_inside", _INSIDE)):
         ends = _GROWTH ** (n - 1) * factor ** (order / _EDGE - 1.0)
         out[name] = ends ** (1.0 / (factor * n - 1.0))

@@ -46,7 +46,7 @@ _MOBILISED = (-0.5, 0.5)
 FEW_HARMONICS = 3
 
 
-def input_variants(few: Run, bodies: Bodies) -> list[Variant | SolvedVariation]:
+def input_variants(few: Run, bodies: Bodies) -> list[Variant]:
     """Both ends of every input that applies, those that take the longest first."""
     plan, name, model = few.plan, few.name, few.model
     out = [make_variant(plan, name, model, bodies, of) for of in _inputs(few)]
@@ -195,7 +195,7 @@ def nearer(model: Model, factor: float) -> Model | None:
 # -- an effect left out ----------------------------------------------------------------------------
 
 
-def along_the_damper(few: Run, bodies: Bodies) -> tuple[Run, Variant | SolvedVariation] | None:
+def along_the_damper(few: Run, bodies: Bodies) -> tuple[Run, Variant] | None:
     """The highest peak on which a point slips alone, and the model in which friction resists
     sliding along the damper too; None where the run has it or nothing rubs.
     """

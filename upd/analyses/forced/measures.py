@@ -60,12 +60,6 @@ class Loop:
     energy: float
 
 
-def read_harmonic(b: Balance) -> int:
-    """Number of the lowest harmonic that is excited."""
-    excited = np.any(b.dynamic != 0.0, axis=1)
-    return int(b.harmonics.dynamic[np.flatnonzero(excited)[0]])
-
-
 def accelerance(
     answer: FrequencyResponse, row: Array, force: float, harmonic: int | None = None
 ) -> ComplexArray:
@@ -87,7 +81,10 @@ def accelerance(
     ComplexArray
         (n,) along the path, (m/s2)/N.
     """
-    k = read_harmonic(answer.balance) if harmonic is None else harmonic
+    k = harmonic
+    if k is None:
+        excited = np.flatnonzero(np.any(answer.balance.dynamic != 0.0, axis=1))
+        k = int(answer.harmonics.dynamic[excited[0]])
     j = answer.harmonics.place(k)
     u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, j]
     return accelerance_of(u, answer.frequency, k, force)
@@ -230,7 +227,7 @@ def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array
     """
     q = model.damper_dofs(answer.coefficients)
     h = answer.harmonics
-    first = h.offset + 2 * h.place(read_harmonic(answer.balance))
+    first = h.offset + 2 * h.place(model.excitation.lowest)
     static = q[:, :, 0] if h.static else np.zeros(q.shape[:2])
     return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])
 
@@ -414,7 +411,8 @@ def numbered_peaks(
     maxima = path_maxima(answer.frequency, height)
     if not maxima:
         return []
-    motion = first_harmonic(answer, np.array([one.sample for one in maxima]))
+    k, at = answer.harmonics.place(model.excitation.lowest), [one.sample for one in maxima]
+    motion = to_complex(answer.coefficients[at], answer.harmonics)[..., k]
     if not answer.arrived:
         # where a path turns round it has a maximum that is no resonance
         on = in_quadrature(model, motion)
@@ -444,13 +442,6 @@ def numbered(
         for mode in (modes.modes[j],)
     ]
     return sorted(named, key=lambda peak: peak.number)
-
-
-def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
-    """Amplitudes (m, n_dof) of all dofs at some points of a path, lowest harmonic excited, mm."""
-    j = answer.harmonics.place(read_harmonic(answer.balance))
-    found = [to_complex(answer.coefficients[i], answer.harmonics)[:, j] for i in points]
-    return np.asarray(found)
 
 
 def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:

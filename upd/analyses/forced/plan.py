@@ -175,16 +175,27 @@ def grid(plan: ForcedPlan) -> Array:
 # -- what is simulated and left out ----------------------------------------------------------------
 
 
+#: where the static forces of the faces come from
+_STATIC = {
+    "seated": "F_C raised from nothing on both faces, coupled contact",
+    "frictionless": "no mean friction before vibration, near what vibration leaves",
+    "opposing": "friction fully mobilised against F_C",
+    "reversed": "friction fully mobilised along F_C",
+}
+
+
 def effects_of(scene: ForcedScene) -> list[Effect]:
     """All of them, of springs at points or of all nodes of both faces."""
     even = "rig, load and contact are even about y = 0: an even motion excites no odd one"
-    whole = scene.mesh.symmetry == "full"
+    whole, static = scene.mesh.symmetry == "full", "N and T of both faces are given"
+    if isinstance(scene.contact.static, str):
+        static = _STATIC[scene.contact.static]
     return [
         *(_of_faces(scene) if scene.contact.model == "interface" else _of_points(scene)),
         Effect.either("motion odd about y = 0", whole, "the full model", even),
         Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x"),
         Effect("lift-off", True, "every point of the contact may open"),
-        Effect("static balance", True, _static_words(scene)),
+        Effect("static balance", True, static),
         Effect("damper inertia", True, "mass and inertia from its mesh"),
         *centrifugal_effects(scene),
     ]
@@ -222,19 +233,6 @@ def _harmonics(scene: ForcedScene, balanced: str, check: str) -> Effect:
     if scene.balance.method == "march":
         return Effect("harmonics", True, "all: time integration")
     return Effect("harmonics", True, balanced, check)
-
-
-def _static_words(scene: ForcedScene) -> str:
-    """Where the static forces of the faces come from."""
-    static = scene.contact.static
-    if not isinstance(static, str):
-        return "N and T of both faces are given"
-    return {
-        "seated": "F_C raised from nothing on both faces, coupled contact",
-        "frictionless": "no mean friction before vibration, near what vibration leaves",
-        "opposing": "friction fully mobilised against F_C",
-        "reversed": "friction fully mobilised along F_C",
-    }[static]
 
 
 def _along(scene: ForcedScene) -> Effect:

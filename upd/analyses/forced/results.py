@@ -14,7 +14,7 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures, performance
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, Limit, LinearCurves, faces_limit, point_limit
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, faces_limit, point_limit
 from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
@@ -109,12 +109,16 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
     between their points by straight lines.
     """
     side, e, stuck = choice.blade, solution.plan.scene.excitation, choice.state == STUCK
-    moves = stuck or (choice.state == FREE and side in excitation_of(e).free_blades)
+    excitation = excitation_of(e)
+    moves = stuck or (choice.state == FREE and side in excitation.free_blades)
     for name, linear in solution.linear.items() if moves else ():
         peaks = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
         case = Case(stiffness=name, kind=choice.state or "", blade=side)
-        read = partial(_limit(solution, name, stuck).accelerance, side)
-        yield Computed(case, (e.start, e.stop), read, peaks)
+        if name in solution.faces:
+            limit = faces_limit(solution.faces[name].march, excitation, e.stop, stuck)
+        else:
+            limit = point_limit(solution.plan, solution.models[name], stuck)
+        yield Computed(case, (e.start, e.stop), partial(limit.accelerance, side), peaks)
     # as the labels of curves tell them apart
     wanted = "" if choice.state else f"{choice.centrifugal_to_force:.6g}"
     for c in solution.curves:
@@ -124,14 +128,6 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             band, case = (float(f.min()), float(f.max())), replace(c.case, blade=side)
             read = partial(on_path, frequency=f, values=H)
             yield Computed(case, band, read, c.peaks.get(side, ()))
-
-
-def _limit(solution: ForcedSolution, name: str, stuck: bool) -> Limit:
-    """Blades free or stuck, exact at any frequency."""
-    plan, e = solution.plan, solution.plan.scene.excitation
-    if name in solution.faces:
-        return faces_limit(solution.faces[name].march, excitation_of(e), e.stop, stuck)
-    return point_limit(plan, solution.models[name], stuck)
 
 
 # -- the contact ----------------------------------------------------------------------------------
@@ -392,32 +388,29 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
         latter what the contact does at its peaks), "performance", every "nonlinear mode", and every
         "measured curve".
     """
-    out: dict[str, Group] = {}
-    scene = solution.plan.scene
-
-    def add(content: str, case: Case | str, variables: Variables) -> None:
-        """A group of a case, or of a stiffness."""
-        mine = case if isinstance(case, Case) else Case(stiffness=case)
-        out[f"{content} {case}"] = Group(variables, content=content, case=mine)
-
+    scene, found = solution.plan.scene, list[tuple[str, Case, Variables]]()
     for name in (*solution.models, *(solution.faces if scene.wants("contact_state") else ())):
-        add(POINTS, name, _points(solution, name))
+        found.append((POINTS, Case(stiffness=name), _points(solution, name)))
     for name, linear in solution.linear.items():
-        add(LINEAR, name, _linear_arrays(solution, linear))
+        found.append((LINEAR, Case(stiffness=name), _linear_arrays(solution, linear)))
     for curve in (c for c in solution.curves if not c.empty):
         contact, peaks = contact_of(solution, curve), _curve_arrays(curve)
         behind = {} if contact is None else _contact_arrays(solution, curve, contact)
         if not curve.way:
-            add(FRICTION, curve.case, peaks | behind)
+            found.append((FRICTION, curve.case, peaks | behind))
             continue
-        add(SWEEP, curve.case, peaks)
+        found.append((SWEEP, curve.case, peaks))
         if contact is not None:
             behind["frequency"] = variable("frequency", contact.frequency, "Hz")
-            add(MARCHED, curve.case, behind)
-    for name, found in solution.performances.items():
-        add(PERFORMANCE, name, performance.performance_arrays(found))
+            found.append((MARCHED, curve.case, behind))
+    for name, one in solution.performances.items():
+        found.append((PERFORMANCE, Case(stiffness=name), performance.performance_arrays(one)))
     for mode in solution.nonlinear_modes:
-        add(MODES, mode.case, performance.mode_arrays(mode))
+        found.append((MODES, mode.case, performance.mode_arrays(mode)))
+    out = {
+        f"{content} {case}": Group(variables, content=content, case=case)
+        for content, case, variables in found
+    }
     return out | (measured.measured_arrays(scene.measured) if out else {})
 
 

@@ -286,7 +286,7 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     plan, bodies = solution.plan, solution.bodies
     assert bodies is not None
     scene, names = plan.scene, list(solution.models)
-    variants: dict[str, list[again.Variant | SolvedVariation]] = {name: [] for name in names}
+    variants: dict[str, list[again.Variant]] = {name: [] for name in names}
     points: list[RatioPoint] = []
     work: list[_Work] = []
     for name in names if scene.estimates else ():
@@ -335,7 +335,7 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
 
 def _around(
     solution: ForcedSolution,
-    variants: Mapping[str, Sequence[again.Variant | SolvedVariation]],
+    variants: Mapping[str, Sequence[again.Variant]],
     points: list[RatioPoint],
     beside: SideProcesses,
 ) -> None:
