@@ -56,6 +56,8 @@ log = logging.getLogger(__name__)
 CHORD = 0.03
 #: Factors kept for Newton's steps with other states; a cycle of loading comes back to the same few.
 KEPT = 4
+#: Trials to raise friction from nothing: all that is missing, or half of what failed.
+PARTS = 12
 #: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
@@ -139,17 +141,15 @@ class Coulomb(CoulombConditions):
             assert best is not None
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
+        self.near_limit = bool(self.mu.any())
         if self.pressed is None:
-            # Bodies that slide by far more than they deform: without friction they are where they
-            # come to be, with it on the same way.
-            answer = self._frictionless(step, start)
+            answer = self._with_rising_friction(step, start)
             used += answer.iterations
-        if not answer.converged and self.mu.any():
+        if not answer.converged and self.near_limit:
             self._forget()
-            self.near_limit = True
             answer = self._newton(step, None, NEWTON_STEPS)
-            self.near_limit = False
             used += answer.iterations
+        self.near_limit = False
         self._forget()
         if answer.converged:
             return replace(answer, iterations=used, method="fallback")
@@ -389,10 +389,30 @@ class Coulomb(CoulombConditions):
                 break
         return answer
 
-    def _frictionless(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
-        """Without friction the forces are the one answer of a box QP, which is proven to end; with
-        it Newton starts there.
+    def _with_rising_friction(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
+        """From the answer without friction, where bodies that slide by far more than they deform
+        are on their way already, by Newton with all of the friction, or with a part first.
         """
+        mu, risen, more = self.mu, 0.0, 1.0
+        self.mu = np.zeros_like(mu)
+        answer = near = self._frictionless(step, start)
+        used = near.iterations
+        for _ in range(PARTS if mu.any() else 0):
+            self._forget()
+            self.mu = (risen + more * (1.0 - risen)) * mu
+            answer = self._newton(step, near.at, NEWTON_STEPS)
+            used += answer.iterations
+            if answer.converged and more == 1.0:
+                break
+            if answer.converged:
+                near, risen, more = answer, risen + more * (1.0 - risen), 1.0
+            else:
+                more *= 0.5
+        self.mu = mu
+        return replace(self.judged(step, answer.at, used), iterations=used)
+
+    def _frictionless(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
+        """Without friction the forces are the one answer of a box QP, which is proven to end."""
         n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
         # forces and moments differ by a length; what moves no normal stays as it is
         size = np.abs(self.B[:n]).max(axis=0)
@@ -414,7 +434,7 @@ class Coulomb(CoulombConditions):
         if step.motion is None:
             s[moved] = found.motion / size[moved]
         forces = np.concatenate((found.x, np.zeros(len(self.C) - n)))
-        # Without friction Newton removes the rest of rounding, where a motion is not free.
+        # Newton removes the rest of rounding, where a motion is not free.
         return self._ended(step, Iterate(forces, s, self.C @ forces - self.B @ s - step.b))
 
     def _ended(self, step: AskedStep, at: Iterate) -> CoupledStep:
