@@ -21,7 +21,7 @@ from upd.linalg.symmetric import Matrix
 from upd.mesh import Mesh
 
 if TYPE_CHECKING:
-    from upd.reduction.guyan import Condensed
+    from upd.linalg.common import Condensed
     from upd.reduction.learned import LearnedCompliance
 
     Reduced = Condensed | LearnedCompliance

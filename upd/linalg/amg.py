@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from upd.linalg.common import (
     AT_ONCE,
     MAX_ITERATIONS,
     FloatArray,
+    Solve,
     checked_dofs,
     checked_vectors,
     log,
@@ -74,30 +73,12 @@ def amg_solve(
         raise InputError(
             f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case."
         )
-    found = MultigridSolver(
+    solver = MultigridSolver(
         A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
-    )(b, rtol)
+    )
+    (found,) = solver.many(b[:, None], rtol)
     log.info("amg: %d dofs, Converged in %d iterations", A.shape[0], found.iterations)
     return found
-
-
-@dataclass(frozen=True)
-class AmgCompliance:
-    """Compliance at some dofs by multigrid.
-
-    Attributes
-    ----------
-    C : (k, k) ndarray
-        mm/N, exactly symmetric.
-    iterations : int
-        Most for a column.
-    solve : callable
-        Forces f_b (k,) at these dofs -> displacements u (n,).
-    """
-
-    C: FloatArray
-    iterations: int
-    solve: Callable[[FloatArray], FloatArray]
 
 
 def compliance_amg(
@@ -107,7 +88,7 @@ def compliance_amg(
     *,
     layout: ArrayLike | None = None,
     points: ArrayLike | None = None,
-) -> AmgCompliance:
+) -> tuple[FloatArray, Solve]:
     """Compliance C = (K^-1)_bb at some dofs, a few columns at a time: k solutions, memory of a few.
 
     The inverse of C is the Schur complement of K on the dofs.
@@ -123,7 +104,10 @@ def compliance_amg(
 
     Returns
     -------
-    AmgCompliance
+    C : (k, k) ndarray
+        mm/N, exactly symmetric.
+    solve : callable
+        Forces f_b (k,) or (k, m) at these dofs -> displacements u (n,) or (n, m).
 
     Raises
     ------
@@ -147,8 +131,9 @@ def compliance_amg(
     log.info("amg: %d columns at %d dofs, at most %d iterations each", len(b), A.shape[0], most)
 
     def solve(force: FloatArray) -> FloatArray:
-        f = np.zeros(A.shape[0])
+        f = np.zeros((A.shape[0], *force.shape[1:]))
         f[b] = checked_vectors(force, len(b), "force at the kept dofs")
-        return solver(f, RTOL).x
+        u = [one.x for one in solver.many(f.reshape(len(f), -1), RTOL)]
+        return np.asarray(u).T.reshape(f.shape)
 
-    return AmgCompliance(0.5 * (C + C.T), most, solve)
+    return 0.5 * (C + C.T), solve
