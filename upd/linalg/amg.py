@@ -11,10 +11,11 @@ from upd.errors import InputError
 from upd.linalg.common import (
     AT_ONCE,
     MAX_ITERATIONS,
+    Condensed,
     FloatArray,
-    Solve,
     checked_dofs,
     checked_vectors,
+    inverse_definite,
     log,
 )
 from upd.linalg.schur import Solved
@@ -88,10 +89,9 @@ def compliance_amg(
     *,
     layout: ArrayLike | None = None,
     points: ArrayLike | None = None,
-) -> tuple[FloatArray, Solve]:
-    """Compliance C = (K^-1)_bb at some dofs, a few columns at a time: k solutions, memory of a few.
-
-    The inverse of C is the Schur complement of K on the dofs.
+) -> Condensed:
+    """Body condensed by its compliance C = (K^-1)_bb at some dofs, a few columns at a time: k
+    solutions, memory of a few. The inverse of C is the Schur complement of K on the dofs.
 
     Parameters
     ----------
@@ -104,10 +104,7 @@ def compliance_amg(
 
     Returns
     -------
-    C : (k, k) ndarray
-        mm/N, exactly symmetric.
-    solve : callable
-        Forces f_b (k,) or (k, m) at these dofs -> displacements u (n,) or (n, m).
+    Condensed
 
     Raises
     ------
@@ -130,10 +127,15 @@ def compliance_amg(
             most = max(most, found.iterations)
     log.info("amg: %d columns at %d dofs, at most %d iterations each", len(b), A.shape[0], most)
 
-    def solve(force: FloatArray) -> FloatArray:
+    C = 0.5 * (C + C.T)
+    C.flags.writeable = False
+    S = inverse_definite(C)
+
+    def recover(u_kept: FloatArray) -> FloatArray:
+        force = S @ checked_vectors(u_kept, len(b), "displacement of the kept dofs")
         f = np.zeros((A.shape[0], *force.shape[1:]))
-        f[b] = checked_vectors(force, len(b), "force at the kept dofs")
+        f[b] = force
         u = [one.x for one in solver.many(f.reshape(len(f), -1), RTOL)]
         return np.asarray(u).T.reshape(f.shape)
 
-    return 0.5 * (C + C.T), solve
+    return Condensed(S, recover, "amg", 0, 0, A.shape[0], [C])

@@ -23,7 +23,6 @@ from upd.linalg.common import (
     Condensed,
     checked_dofs,
     checked_vectors,
-    inverse_definite,
     is_free,
     log,
     softest_motion,
@@ -119,14 +118,7 @@ def condense(
     choice = choose(n, len(kept), solver=solver, memory_limit_bytes=memory_limit_bytes)
     log.info("condensation of %d dofs onto %d by %s: %s", n, len(kept), choice.name, choice.why)
     if choice.name == "amg" and len(kept) < n:
-        C, solve = compliance_amg(A, kept, modes, layout=layout, points=points)
-        C.flags.writeable = False
-        S = inverse_definite(C)
-
-        def recover(u_kept: FloatArray) -> FloatArray:
-            return solve(S @ checked_vectors(u_kept, len(kept), "displacement of the kept dofs"))
-
-        return Condensed(S, recover, "amg", 0, 0, n, [C])
+        return compliance_amg(A, kept, modes, layout=layout, points=points)
     direct = "auto" if choice.name == "amg" else choice.name
     found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
     _refuse_floating(found.S, A.diagonal()[kept])

@@ -357,5 +357,5 @@ def _mesh_error(
         data = solution.plan.scene.materials[body.name]
         mean = body.side * float(nodal @ u[body.contact, 2]) / float(nodal.sum())
         whole += mean - share.finite_body - bulk.half_space_mean(patch, force, data.E, data.nu)
-        far += share.far_mesh
+        far += share.fitted - share.finite_body
     return whole - far, far

@@ -263,7 +263,8 @@ def _touch(solution: ContactSolution) -> float:
 
     A gap that is left at the apex of a curved body is the lattice's, an overlap is the file's.
     """
-    touch = solution.model.first_touch
+    # negative where the meshes overlap
+    touch = float(solution.model.gap.min())
     return min(0.0, touch) if solution.curved else touch
 
 
