@@ -34,6 +34,8 @@ FREE, LOWER, UPPER = 0, -1, 1
 EPS = float(np.finfo(float).eps)
 #: half of the digits: below this share of the largest resistance a motion counts as not resisted
 HALF_THE_DIGITS = float(np.sqrt(EPS))
+# Levels of rounding do not underflow below it; no motion or force is as small.
+_TINY = float(np.finfo(float).tiny)
 # A primal-dual active set that works takes 3 to 10 steps; longer chains are handed over to the
 # least distance.
 ACTIVE_SET_STEPS = 50
@@ -268,7 +270,7 @@ class BoxQP:
         rigid = np.abs(self.B) @ np.abs(s)
         terms = np.abs(box.h) + rigid + self._row * float(np.abs(x).sum())
         left = box.h + self.product(x) - self.B @ s
-        return _Step(x, left, s, np.asarray(self._rounding * terms))
+        return _Step(x, left, s, np.asarray(self._rounding * terms + _TINY))
 
     def _refined(self, box: _Box, step: _Step | None, state: State) -> _Step | None:
         """Iterative refinement of a step.
@@ -293,8 +295,9 @@ class BoxQP:
         if box.load is None:
             return bool(np.all(kkt & inside))
         arms = np.abs(self.B).max(axis=0)
-        balance = np.abs(self._resultants(step.x) - box.load) <= 4 * self._rounding * (
-            np.abs(box.load) + arms * np.abs(step.x).sum()
+        balance = (
+            np.abs(self._resultants(step.x) - box.load)
+            <= 4 * self._rounding * (np.abs(box.load) + arms * np.abs(step.x).sum()) + _TINY
         )
         return bool(np.all(kkt & inside) and np.all(balance))
 
