@@ -247,21 +247,3 @@ def body_share(
         finite_body_share(body, displacement, forces, patch, radius, E, nu, tangential=False),
         float(curve[-1]),
     )
-
-
-def without_body(stiffness: float, body_compliance: float) -> float:
-    """Stiffness of the contact alone, bulk compliance removed.
-
-    Parameters
-    ----------
-    stiffness : float
-        Stiffness of contact and bodies in series [N/mm].
-    body_compliance : float
-        Compliance that the bodies add in series [mm/N].
-
-    Returns
-    -------
-    float
-        Stiffness [N/mm].
-    """
-    return 1.0 / (1.0 / stiffness - body_compliance)

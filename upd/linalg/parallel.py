@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import cache
 from typing import TypeVar, cast
 
@@ -63,41 +63,51 @@ def in_parallel(jobs: Sequence[Callable[[], Found]], workers: int) -> list[Found
         # Loaded first, so that its threads are limited too.
         load()
     with threadpool_limits(limits=1), ThreadPoolExecutor(workers) as pool:
-        return run_jobs(pool, jobs)
-
-
-def run_jobs(pool: Executor | None, jobs: Sequence[Callable[[], Found]]) -> list[Found]:
-    """Results of the jobs in their order, one after the other where there is no pool.
-
-    The jobs are the same either way, so that what they return does not depend on the number of
-    threads.
-
-    Parameters
-    ----------
-    pool : Executor or None
-    jobs : sequence of callable
-        Without arguments; side by side only what leaves the interpreter to others.
-
-    Returns
-    -------
-    list
-        What each job returned.
-    """
-    if pool is None or len(jobs) < 2:
-        return [job() for job in jobs]
-    waiting = [pool.submit(job) for job in jobs]
+        waiting = [pool.submit(job) for job in jobs]
     return [one.result() for one in waiting]
 
 
-@contextmanager
-def side_by_side(workers: int) -> Iterator[Executor | None]:
-    """Threads that stay, to run short jobs again and again; BLAS keeps to one thread meanwhile.
+class SideBySide:
+    """Threads that stay, for short jobs again and again; BLAS keeps to one thread meanwhile.
+
+    Outside of its `with` the jobs run one after the other. The jobs are the same either way, so
+    that what they return does not depend on the number of threads.
 
     Parameters
     ----------
     workers : int
         Jobs at a time.
     """
-    threads = ThreadPoolExecutor(workers) if workers > 1 else nullcontext()
-    with threadpool_limits(limits=1, user_api="blas"), threads as pool:
-        yield pool
+
+    def __init__(self, workers: int = 1) -> None:
+        self.workers = workers
+        self._pool: ThreadPoolExecutor | None = None
+        self._stack = ExitStack()
+
+    def __enter__(self) -> SideBySide:
+        self._stack.enter_context(threadpool_limits(limits=1, user_api="blas"))
+        if self.workers > 1:
+            self._pool = self._stack.enter_context(ThreadPoolExecutor(self.workers))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool = None
+        self._stack.close()
+
+    def run(self, jobs: Sequence[Callable[[], Found]]) -> list[Found]:
+        """Results of the jobs in their order.
+
+        Parameters
+        ----------
+        jobs : sequence of callable
+            Without arguments; side by side only what leaves the interpreter to others.
+
+        Returns
+        -------
+        list
+            What each job returned.
+        """
+        if self._pool is None or len(jobs) < 2:
+            return [job() for job in jobs]
+        waiting = [self._pool.submit(job) for job in jobs]
+        return [one.result() for one in waiting]

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from upd.analyses import base
 from upd.analyses.contact.plan import direction_name, normal_loads
 from upd.analyses.contact.solution import ContactSolution, NormalCase, References, TangentialCase
-from upd.contact.bulk import without_body
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.patch import consistent_average
 from upd.mesh import recipes
@@ -239,8 +238,9 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
     out = _beside(at, known, *raw)
     if not solution.curved:
         return out + _stiffness_of_faces(solution, case)
+    # of the contact alone: the bodies' compliance in series with it taken off
     bodies = case.finite_body / case.force
-    K_N, rows = without_body(case.stiffness, bodies), list[tuple[Quantity, float]]()
+    K_N, rows = 1.0 / (1.0 / case.stiffness - bodies), list[tuple[Quantity, float]]()
     if case.shares:
         # Of the approach within 3a, 1.5 F / d as F goes with d^1.5, what the thesis takes for the
         # contact's (its section 6.5): 23 % of a half-space's displacement lies beyond 3a, so it is
@@ -248,12 +248,12 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
         within = _within_3a(case)
         if within > _ROUNDING * case.approach:
             rows.append((q.K_N_TANGENT_3A, 1.5 * case.force / within))
-        rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, without_body(secant, bodies))]
+        rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, 1.0 / (1.0 / secant - bodies))]
     stuck = next((total for total, _ in case.stuck.values()), None)
     if stuck is not None and known:
         rows.append((q.K_T_INITIAL_RAW, stuck))
         if case.shear_shares:
-            K_T = without_body(stuck, case.finite_body_shear)
+            K_T = 1.0 / (1.0 / stuck - case.finite_body_shear)
             rows += [(q.K_T_INITIAL, K_T), (q.K_T_OVER_K_N, K_T / K_N)]
     return out + _beside(at, known, *rows)
 

@@ -27,7 +27,7 @@ from upd.hbm.faces.state import EPS, ComplexArray, FloatArray, InterfaceModel, I
 from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.hbm.faces.sweep import settle
 from upd.hbm.springs.sweep import FREQUENCY_SHARE
-from upd.linalg.parallel import side_by_side
+from upd.linalg.parallel import SideBySide
 from upd.linalg.select import threads_used
 
 #: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
@@ -176,12 +176,11 @@ def interface_response(
             "in Hz"
         )
     s = settings or replace(Settings(), tolerance=TOLERANCE, smallest_step=SHORTEST)
-    with side_by_side(threads_used() if workers is None else workers) as pool:
+    with SideBySide(threads_used() if workers is None else workers) as beside:
         equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
-        equations.pool = pool
+        equations.beside = beside
         curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))
         status, message = curve.follow(f)
-    equations.pool = None
     points, outputs = curve.places, len(model.seen_modes)
     return InterfaceResponse(
         np.array([one.frequency for one in points]),

@@ -16,7 +16,6 @@ has the march's. The forces' coefficients are sums over the samples.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +28,7 @@ from upd.hbm.faces.kept import given_blades, kept_inverses
 from upd.hbm.faces.march import Fallback
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import STICK, judge
+from upd.linalg.parallel import SideBySide
 
 IntArray = NDArray[np.int64]
 
@@ -148,7 +148,7 @@ class InterfaceEquations:
         self.model, self.samples, self.highest, self.fallback = model, samples, highest, fallback
         self.start = start
         #: what is independent runs on its threads
-        self.pool: Executor | None = None
+        self.beside = SideBySide()
         basis = harmonics(range(highest + 1))
         #: samples are at the ends of the steps
         self.E = np.roll(synthesis(basis, samples), -1, axis=0)

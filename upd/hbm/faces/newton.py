@@ -30,7 +30,6 @@ from upd.hbm.faces.jacobian import VERGE, factor_period, invert_period, march_di
 from upd.hbm.faces.state import FloatArray
 from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.linalg.compiled_lu import PIVOT
-from upd.linalg.parallel import run_jobs
 
 #: net slip over the way slipped in a period: 0 for a periodic motion, 1 for a slip in one direction
 ADDS_UP = 0.5
@@ -91,7 +90,7 @@ class PeriodDerivative:
             partial(factor_period, a, min(a + SAMPLES, N), samples, step.W, self.Z, law, self.rows)
             for a in range(0, N, SAMPLES)
         ]
-        self.fine = all(run_jobs(e.pool, jobs))
+        self.fine = all(e.beside.run(jobs))
         self.lacks = bool((left != 0.0).any())
         self.remembered = _remembered(period, state[0], on, step.rho_t)
         self.late = (model.load - period.force @ model.columns) @ step.dJ.T
@@ -145,8 +144,7 @@ class PeriodDerivative:
             )
             return (e.Q @ forces.reshape(N, -1)).reshape(h, m, -1), *ends
 
-        jobs = [partial(some, slice(a, a + wide)) for a in range(0, C, wide)]
-        found = run_jobs(e.pool, jobs)
+        found = e.beside.run([partial(some, slice(a, a + wide)) for a in range(0, C, wide)])
         modal, after, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
         return modal, after, slid
 
@@ -158,7 +156,7 @@ class PeriodDerivative:
             partial(invert_period, first, min(first + SAMPLES, N), at, square, factors, pivots)
             for first in range(0, N, SAMPLES)
         ]
-        self.inverted, self.fine = True, all(run_jobs(self.e.pool, jobs))
+        self.inverted, self.fine = True, all(self.e.beside.run(jobs))
 
 
 def _remembered(
