@@ -22,7 +22,7 @@ import upd
 from upd.errors import UpdError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
-from upd.linalg.schur import DirectSolver, Solver
+from upd.linalg.schur import DirectSolver
 from upd.reduction.guyan import require_held
 
 Row = dict[str, Any]
@@ -120,12 +120,12 @@ def products() -> Iterator[Row]:
             begin = time.process_time()
             try:
                 require_held(K, modes)
-                solver: Solver = (
+                solver = (
                     DirectSolver(K, "pardiso")
                     if route == "factor"
                     else MultigridSolver(K, modes, layout=free, points=points)
                 )
-                found = solver(load, ACCURACY)
+                (found,) = solver.many(load[:, None], ACCURACY)
             except UpdError as error:
                 yield row(f"product, {case}, {route}", refusal(error, begin))
                 continue

@@ -21,7 +21,6 @@ from upd.contact.products import (
     KNOWN_STIFFNESS,
     energy_error,
     half_space_start,
-    learning,
     settled,
     unknown,
 )
@@ -91,7 +90,7 @@ def test_forces_gaps_and_approach_are_those_of_the_condensed_bodies(
     assert found.approach == pytest.approx(exact.approach, rel=1e-9)
     assert found.stiffness == pytest.approx(exact.stiffness, rel=1e-9)
     for body in (mine.upper, mine.lower):
-        learned = learning(body, (NORMAL,))
+        learned = body.condensed[(NORMAL,)][0]
         assert learned is not None and learned.products < 20 < len(exact.force)
 
 
@@ -121,7 +120,7 @@ def test_the_bound_holds_where_products_are_rough() -> None:
 def test_all_products_make_the_dense_compliance() -> None:
     dense, mine = condensed(), model("superlu")
     body = mine.upper
-    learned = learning(body, (NORMAL,))
+    learned = body.condensed[(NORMAL,)][0]
     assert learned is not None
     exact = dense.upper.compliance(NORMAL)
     for force in np.eye(len(exact)):
@@ -138,7 +137,7 @@ def test_all_products_make_the_dense_compliance() -> None:
 @pytest.mark.parametrize("way", ["superlu", "amg"])
 def test_several_forces_are_learned_at_once(way: str) -> None:
     dense, mine = condensed(), model(way)
-    learned = learning(mine.lower, (NORMAL,))
+    learned = mine.lower.condensed[(NORMAL,)][0]
     assert learned is not None
     exact = dense.lower.compliance(NORMAL)
     forces = np.random.default_rng(4).random((len(exact), 11))
@@ -157,7 +156,7 @@ def test_fields_are_sums_of_known_ones() -> None:
     found = by_products(mine, load=50.0)
     for name in ("upper", "lower"):
         body, exact = getattr(mine, name), getattr(dense, name)
-        learned = learning(body, (NORMAL,))
+        learned = body.condensed[(NORMAL,)][0]
         assert learned is not None
         count = learned.products
         u = body.displacement(NORMAL, mine.nodal(found.force))
@@ -259,14 +258,14 @@ def test_a_body_that_learns_nothing_more_is_told() -> None:
 
 def test_route_follows_the_predicted_cost() -> None:
     small = contact_routes(30_000, 441, 12)
-    assert choose_route(small, 12)[0].name == small[0].name
+    assert choose_route(small, 12).name == small[0].name
     large = contact_routes(1_500_000, 3600, 12)
     names = [way.name for way in large]
     assert len(names) == 3 and names[1].startswith("products by ") and names[2].endswith("amg")
-    taken, cost = choose_route(large, 12, memory_limit_bytes=8e9)
-    assert taken.name == "products by amg" and cost.bytes < 8e9
-    assert choose_route(large, 12, route="condensed", memory_limit_bytes=8e9)[0].name == names[0]
-    assert choose_route(small, 12, route="products")[0].name.startswith("products by ")
+    taken = choose_route(large, 12, memory_limit_bytes=8e9)
+    assert taken.name == "products by amg" and taken.cost.bytes < 8e9
+    assert choose_route(large, 12, route="condensed", memory_limit_bytes=8e9).name == names[0]
+    assert choose_route(small, 12, route="products").name.startswith("products by ")
     with pytest.raises(InputError, match="Unknown route"):
         choose_route(small, 12, route="dense")
 

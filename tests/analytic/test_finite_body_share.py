@@ -12,6 +12,7 @@ from upd.analyses.contact.solve import solve_plan
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.patch import make_patch
 from upd.errors import MeshError
+from upd.linalg.symmetric import whole
 from upd.progress import Stages
 from upd.reference import boussinesq, boussinesq_stress, hertz_sphere
 
@@ -61,7 +62,7 @@ def test_share_is_that_of_a_solve_for_the_difference_of_the_fields() -> None:
     u = np.stack(np.broadcast_arrays(*boussinesq(*x[distant].T, case.force, 2e5, 0.3)), axis=1)
     w[distant] = -u * into
     _, free = body.condensed[(2,)]
-    K = body.K.whole()
+    K = whole(body.K)
     flat = w.ravel()
     flat[free] = spsolve(K[free][:, free].tocsc(), (load.ravel() - K @ flat)[free])
     force = model.nodal(case.solution.force)

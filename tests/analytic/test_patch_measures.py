@@ -103,7 +103,6 @@ def test_part_model_measures_as_the_whole(mirrored: tuple[bool, bool]) -> None:
     assert np.allclose(whole, force, rtol=1e-12, atol=0.0)
     assert np.allclose(part.area(), 0.025**2, rtol=1e-12)
     assert np.allclose(part.whole(force[cut].ravel()[shuffled]), force, rtol=1e-12)
-    assert part.copies == 2 ** sum(mirrored)
 
 
 def test_nodes_off_the_lattice_are_refused() -> None:

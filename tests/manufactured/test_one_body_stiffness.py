@@ -19,6 +19,7 @@ from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, make_plan
 from upd.analyses.contact.solution import ContactSolution
 from upd.analyses.contact.solve import solve_plan as solve
 from upd.contact.model import Body, free_dofs
+from upd.linalg.symmetric import whole
 from upd.mesh import Mesh
 from upd.progress import Stages
 from upd.report.notebook import RunResult
@@ -79,7 +80,7 @@ def moved(body: Body, mirror: dict[str, tuple[int, ...]], on: np.ndarray, compon
     """
     dofs = 3 * body.contact[on] + component
     free = np.setdiff1d(free_dofs(body.mesh, mirror), dofs)
-    K, W, u = body.K.whole(), in_the_mean(body.mesh, mirror), np.zeros(3 * body.mesh.n_node)
+    K, W, u = whole(body.K), in_the_mean(body.mesh, mirror), np.zeros(3 * body.mesh.n_node)
     u[dofs] = 1.0
     A = (
         block_array([[K[free][:, free], W[free]], [W[free].T, None]])

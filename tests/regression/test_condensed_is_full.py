@@ -11,6 +11,7 @@ from scipy.sparse.linalg import spsolve
 from upd import load_scene, make_plan
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.contact.solve import solve_plan as solve
+from upd.linalg.symmetric import whole
 from upd.progress import Stages
 
 
@@ -24,7 +25,7 @@ def full_model_contact(solution, load):
     blocks, columns, offset = [], [], 0
     for body in (model.upper, model.lower):
         free = body.condensed[next(c for c in body.condensed if NORMAL in c)][1]
-        blocks.append(body.K.submatrix(free).whole())
+        blocks.append(whole(body.K.submatrix(free)))
         place = np.searchsorted(free, 3 * body.contact + NORMAL)
         columns.append((offset + place, body.side))
         offset += len(free)
@@ -90,7 +91,7 @@ def test_tangential_stiffness_of_the_stuck_contact() -> None:
     offset, blocks, columns = 0, [], []
     for body in (model.upper, model.lower):
         free = body.condensed[next(c for c in body.condensed if 0 in c)][1]
-        blocks.append(body.K.submatrix(free).whole())
+        blocks.append(whole(body.K.submatrix(free)))
         columns.append((offset + np.searchsorted(free, 3 * body.contact[loaded]), body.side))
         offset += len(free)
     B = sparse.lil_array((len(loaded), offset))

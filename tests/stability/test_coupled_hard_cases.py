@@ -12,7 +12,7 @@ import pytest
 from upd.contact import CoupledContact, coupled_contact, normal_contact
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import AskedStep, Iterate
-from upd.contact.load_steps import CoupledHistory
+from upd.contact.coupled import CoupledHistory
 from upd.contact.rigid_damper import face_forces
 from upd.errors import ConvergenceError, InputError
 from upd.reference import half_space_compliance

@@ -18,6 +18,7 @@ from upd.analyses.seated.bodies import Bodies, lattice, make_bodies, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.contact.rigid_damper import equilibrium
 from upd.fem import Material, mass, stiffness
+from upd.linalg import symmetric
 from upd.reference import half_space_compliance
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES
@@ -125,7 +126,7 @@ def test_against_whole_matrices(scene: str) -> None:
         push = np.zeros((blade.mesh.n_node, 3))
         push[nodes] = f[on] @ frame
         u = np.zeros(3 * blade.mesh.n_node)
-        u[blade.free] = spsolve(blade.K.whole().tocsc(), push.ravel()[blade.free])
+        u[blade.free] = spsolve(symmetric.whole(blade.K).tocsc(), push.ravel()[blade.free])
         own = dict(zip(blade.mesh.nodes["patch"], mesh.nodes[f"{side}_patch"], strict=True))
         there = np.array([own[node] for node in nodes])
         np.testing.assert_allclose(mesh.points[there], blade.mesh.points[nodes], atol=1e-9)

@@ -2,7 +2,7 @@
 
 Every piece is work that can be counted before it is done (entries and operations of a factor, right
 sides, dense algebra, Newton steps times points) over the rates of a usual machine
-(`upd.linalg.select.Rates`). The work of a piece was counted or timed on the ready scenes with one
+(`upd.linalg.select`). The work of a piece was counted or timed on the ready scenes with one
 thread.
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from upd.errors import InputError
 from upd.linalg import select
-from upd.linalg.select import USUAL, Prediction, Solid, choose_route, contact_routes
+from upd.linalg.select import Prediction, Solid, choose_route, contact_routes
 from upd.scene import AnyScene
 
 #: element -> nodes per hexahedron
@@ -33,7 +33,7 @@ START_BYTES = 2.5e8
 
 def dense_s(flops: float) -> float:
     """Seconds of dense algebra."""
-    return flops / USUAL.dense_flops
+    return flops / select.DENSE_FLOPS
 
 
 def memory_limit(scene: AnyScene) -> float:
@@ -76,13 +76,13 @@ class CostModel:
 
     def contact_body(self, count: Count) -> None:
         """A body meshed, with its K."""
-        self.seconds += 0.2 + count["hexes"] * _K[self.scene.mesh.element] / USUAL.elements
+        self.seconds += 0.2 + count["hexes"] * _K[self.scene.mesh.element] / select.ELEMENTS
         self.kept_bytes += self._entries(count) * _ENTRY
 
     def dynamic_body(self, count: Count, times: float = 1.0) -> None:
         """A body with its K and M."""
         elements = count["hexes"] * _K_AND_M[self.scene.mesh.element]
-        self.seconds += times * (0.1 + elements / USUAL.elements)
+        self.seconds += times * (0.1 + elements / select.ELEMENTS)
         # M has no entries between components.
         self.kept_bytes += self._entries(count) * _ENTRY * 4.0 / 3.0
 
@@ -103,7 +103,7 @@ class CostModel:
             solid=solid,
         )
         self.solver[task] = f"{choice.name}: {choice.why}"
-        return select.predict(n_dof, n_kept, choice.name, solid)
+        return choice.cost
 
     def condensed(self, task: str, count: Count, n_kept: int) -> None:
         """A body condensed onto its contact dofs."""
@@ -133,9 +133,9 @@ class CostModel:
             solid=self.solid(count),
         )
         rest = room - self._entries(count) * _COPIES
-        choice, found = choose_route(ways, products, route=asked.route, memory_limit_bytes=rest)
+        choice = choose_route(ways, products, route=asked.route, memory_limit_bytes=rest)
         self.solver[task] = f"{choice.name}: {choice.why}"
-        self._condensed(task, count, n_kept, found)
+        self._condensed(task, count, n_kept, choice.cost)
 
     def held_in_mean(self, task: str, count: Count) -> None:
         """What a body that was condensed takes more where a weighted set holds it: another factor,
@@ -225,7 +225,7 @@ class CostModel:
         """Seconds by the clock, with so many workers on the jobs that may run side by side."""
         # Alone, a factorisation itself takes all threads; the gain is about the same.
         many = max(workers, 1) if workers > 1 else 2
-        gain = USUAL.speedup if min(many, select.threads_used()) > 1 else 1.0
+        gain = select.SPEEDUP if min(many, select.threads_used()) > 1 else 1.0
         return self.seconds + self.shared / gain
 
 

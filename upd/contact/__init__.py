@@ -1,8 +1,7 @@
 """Contact and friction between condensed bodies."""
 
-from upd.contact.coupled import CoupledContact, coupled_contact
+from upd.contact.coupled import CoupledContact, CoupledHistory, coupled_contact
 from upd.contact.law import ContactLaw, contact_points
-from upd.contact.load_steps import CoupledHistory
 from upd.contact.normal import NormalContact, normal_contact, normal_curve
 from upd.contact.tangential import (
     TangentialContact,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,6 +53,8 @@ class Bordered:
         self.rows = base.rows
         self._place = np.full((of.c, of.n), -1)
         self._place[:, base.nodes] = np.arange(base.q).reshape(of.c, -1)
+        #: compliance (q, q) of the closed dofs, beside which no others have forces
+        self._block = of.C.take(base.dofs, axis=0).take(base.dofs, axis=1)
         self._known: dict[int, FloatArray] = {}
         self._last: tuple[NewtonRows, _Border] | None = None
 
@@ -115,11 +116,6 @@ class Bordered:
         found = gmres(product, r, _INEXACT, _KRYLOV, near)
         df, ds = np.split(found.x, [len(of.C)])
         return (df, ds) if found.reached else None
-
-    @cached_property
-    def _block(self) -> FloatArray:
-        """(q, q) compliance of the closed dofs, beside which no others have forces."""
-        return self.base.of.C.take(self.base.dofs, axis=0).take(self.base.dofs, axis=1)
 
     def _border(self, rows: NewtonRows) -> _Border | None:
         """The border of other rows; None where it is as dear as a factor, or singular."""

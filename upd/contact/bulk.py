@@ -100,7 +100,8 @@ def finite_body_share(
     reaction = (body.K @ displacement.ravel()).reshape(-1, 3)[distant] * into
     x1, x2, x3 = x[distant].T
     half_space = np.stack(np.broadcast_arrays(*field(x1, x2, x3, total, E, nu)), axis=1)
-    return patch.copies * (work + float((reaction * half_space).sum())) / total
+    copies = (1 + patch.mirrored[0]) * (1 + patch.mirrored[1])
+    return copies * (work + float((reaction * half_space).sum())) / total
 
 
 def _free_faces(
@@ -182,18 +183,13 @@ class BodyShare:
         Displacement of the finite, held body minus that of the half-space held at infinity, at the
         surface [mm], positive into the body (`finite_body_share`).
     fitted : float
-        The same read off the computed displacement along the axis [mm]: with the error of the mesh
-        far from the contact.
+        The same read off the computed displacement along the axis [mm]: less `finite_body` it is
+        what the mesh far from the contact adds by its coarseness.
     """
 
     compression: float
     finite_body: float
     fitted: float
-
-    @property
-    def far_mesh(self) -> float:
-        """What the mesh far from the contact adds by its coarseness [mm]."""
-        return self.fitted - self.finite_body
 
     def over(self, load: float) -> BodyShare:
         """The same per load [mm/N]."""
@@ -251,21 +247,3 @@ def body_share(
         finite_body_share(body, displacement, forces, patch, radius, E, nu, tangential=False),
         float(curve[-1]),
     )
-
-
-def without_body(stiffness: float, body_compliance: float) -> float:
-    """Stiffness of the contact alone, bulk compliance removed.
-
-    Parameters
-    ----------
-    stiffness : float
-        Stiffness of contact and bodies in series [N/mm].
-    body_compliance : float
-        Compliance that the bodies add in series [mm/N].
-
-    Returns
-    -------
-    float
-        Stiffness [N/mm].
-    """
-    return 1.0 / (1.0 / stiffness - body_compliance)

@@ -51,9 +51,6 @@ from upd.errors import ConvergenceError
 
 log = logging.getLogger(__name__)
 
-#: A step with the kept factor that gains less than this is made again with its own: that converges
-#: quadratically, and costs as much as a dozen of them.
-CHORD = 0.03
 #: Factors kept for Newton's steps with other states; a cycle of loading comes back to the same few.
 KEPT = 4
 #: Trials to raise friction from nothing: all that is missing, or half of what failed.
@@ -71,19 +68,15 @@ class Coulomb(CoulombConditions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._kept: NewtonSystem | None = None
+        #: factors kept between iterates
         self._bordered: list[Bordered] = []
 
     def twin(self) -> Coulomb:
         """The same contact with what is kept between iterates of its own: for another thread."""
         _ = self.carried  # found once for all
         out = copy(self)
-        out._forget()
+        out._bordered = []
         return out
-
-    def _forget(self) -> None:
-        """Drop what is kept between iterates: it may be the very thing that failed."""
-        self._kept, self._bordered = None, []
 
     # -- answers -----------------------------------------------------------------------------------
 
@@ -126,13 +119,13 @@ class Coulomb(CoulombConditions):
         for first in (None,) if start is None else (start, None):
             if used:
                 # What the run before kept may be the very thing that failed.
-                self._forget()
+                self._bordered = []
             answer = self._newton(step, first, NEWTON_STEPS, turned)
             used += answer.iterations
             if answer.converged:
                 return replace(answer, iterations=used)
             best = answer if best is None or answer.residual < best.residual else best
-        self._forget()
+        self._bordered = []
         if load is not None and not load.any() and self.pressed is None:
             answer = self.judged(step, self._let_go(step, start), used)
             if answer.converged:
@@ -146,11 +139,11 @@ class Coulomb(CoulombConditions):
             answer = self._with_rising_friction(step, start)
             used += answer.iterations
         if not answer.converged and self.near_limit:
-            self._forget()
+            self._bordered = []
             answer = self._newton(step, None, NEWTON_STEPS)
             used += answer.iterations
         self.near_limit = False
-        self._forget()
+        self._bordered = []
         if answer.converged:
             return replace(answer, iterations=used, method="fallback")
         if self.pressed is not None and load is not None:
@@ -172,13 +165,9 @@ class Coulomb(CoulombConditions):
             else self._moved(step, start, turned)
         )
         best: CoupledStep | None = None
-        ahead: CoupledStep | None = None
         fine = len(self.C) * EPS
         for used in range(1, limit + 1):
-            answer = (
-                self.judged(step, at, used) if ahead is None else replace(ahead, iterations=used)
-            )
-            ahead = None
+            answer = self.judged(step, at, used)
             if best is not None and best.converged:
                 # One step beyond: what the next load step starts from is as good as can be.
                 return answer if answer.converged and answer.residual < best.residual else best
@@ -192,17 +181,10 @@ class Coulomb(CoulombConditions):
             if near is not None:
                 at = near
                 continue
-            near = self._chord(step, at, rows)
-            if near is not None:
-                ahead = self.judged(step, near, used)
-                if answer.converged or ahead.residual < CHORD * answer.residual:
-                    at = near
-                    continue
-                ahead = None
             try:
                 at = self.linear_step(step, rows)
             except np.linalg.LinAlgError:
-                self._forget()
+                self._bordered = []
                 break
             if not np.isfinite(at.f).all():
                 break
@@ -260,16 +242,14 @@ class Coulomb(CoulombConditions):
         """
         rows = self.rows_at(start)
         if turned:
-            rows = self._stuck_at(rows, ~rows.is_open)
+            closed = ~rows.is_open
+            rows.P[closed], rows.Q[closed] = 0.0, np.eye(self.c)
+            rows.rhs[closed], rows.relaxed[closed] = 0.0, False
         s = start.s if step.motion is None else step.motion
         y = self.C @ start.f - self.B @ s - step.b
         near = self._nearby(step, Iterate(start.f, s, y, True), rows)
         if near is not None:
             return near
-        kept = self._serving(step, rows)
-        if kept is not None:
-            # Its rows are those of an iterate as near as the step before converged.
-            return Iterate(*kept.refined(kept.rows.rhs.T.ravel(), step))
         try:
             return self.linear_step(step, rows)
         except np.linalg.LinAlgError:
@@ -289,42 +269,19 @@ class Coulomb(CoulombConditions):
             return None
         if at.f.reshape(c, n)[:, rows.is_open & near.rows.is_open].any():
             return None
-        found = near.step(rows, *self._left(step, at, rows), self.rho.T)
+        # what the iterate leaves of the rows, and of the load
+        f, y = (v.reshape(c, n) for v in (at.f, self._misfit(step, at)))
+        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, f)
+        left -= np.einsum("nij,jn->ni", rows.Q, y)
+        missing = None if step.load is None else step.load - self.B.T @ at.f
+        found = near.step(rows, left, missing, self.rho.T)
         if found is None:
             return None
         f, s = at.f + found[0], at.s + found[1]
         f.reshape(c, n)[:, rows.is_open] = 0.0
         return Iterate(f, s, self.C @ f - self.B @ s - step.b, True)
 
-    def _chord(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
-        """A step of Newton with the kept factor, where the same nodes are open, stuck and slipping:
-        the directions of slip alone have moved. None where others are.
-        """
-        kept = self._serving(step, rows)
-        if kept is None or at.f.reshape(self.c, self.n)[:, rows.is_open].any():
-            return None
-        left, missing = self._left(step, at, rows)
-        still = np.zeros_like(at.s) if missing is None else None
-        df, ds, dy = kept.solve(left.T.ravel(), AskedStep(np.zeros_like(at.f), missing, still))
-        return Iterate(at.f + df, at.s + ds, self._misfit(step, at) + dy)
-
-    def _left(
-        self, step: AskedStep, at: Iterate, rows: NewtonRows
-    ) -> tuple[FloatArray, FloatArray | None]:
-        """What an iterate leaves of the rows, (n, c), and of the load."""
-        f, y = (v.reshape(self.c, self.n) for v in (at.f, self._misfit(step, at)))
-        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, f)
-        left -= np.einsum("nij,jn->ni", rows.Q, y)
-        return left, None if step.load is None else step.load - self.B.T @ at.f
-
     # -- linear algebra ----------------------------------------------------------------------------
-
-    def _serving(self, step: AskedStep, rows: NewtonRows) -> NewtonSystem | None:
-        """The kept system where its rows have the same nodes open, stuck and slipping."""
-        kept = self._kept
-        if kept is None or kept.by_load != (step.load is not None):
-            return None
-        return kept if kept.rows.same_states(rows) else None
 
     def system_of(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
         """The rows, factored.
@@ -335,7 +292,7 @@ class Coulomb(CoulombConditions):
 
     def linear_step(self, step: AskedStep, rows: NewtonRows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
-        self._kept = system = self.system_of(rows, step.load is not None)
+        system = self.system_of(rows, step.load is not None)
         closed = isinstance(system, ClosedSystem)
         if isinstance(system, ClosedSystem) and system.dear:
             self._bordered = [*self._bordered, Bordered(system)][-KEPT:]
@@ -398,7 +355,7 @@ class Coulomb(CoulombConditions):
         answer = near = self._frictionless(step, start)
         used = near.iterations
         for _ in range(PARTS if mu.any() else 0):
-            self._forget()
+            self._bordered = []
             self.mu = (risen + more * (1.0 - risen)) * mu
             answer = self._newton(step, near.at, NEWTON_STEPS)
             used += answer.iterations

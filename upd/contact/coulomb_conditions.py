@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,13 +241,6 @@ class CoulombConditions:
         one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
         free = np.zeros((n, c), bool)
         return NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), free, free[:, 0].copy())
-
-    def _stuck_at(self, rows: NewtonRows, nodes: NDArray[Any]) -> NewtonRows:
-        """The rows with some nodes stuck, in place."""
-        stuck = self.all_stuck()
-        for part in ("P", "Q", "rhs", "relaxed", "is_open"):
-            getattr(rows, part)[nodes] = getattr(stuck, part)[nodes]
-        return rows
 
     def rows_at(self, at: Iterate) -> NewtonRows:
         """Rows of the stabilised Jacobian at an iterate.

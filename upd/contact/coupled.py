@@ -8,7 +8,9 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +24,39 @@ from upd.contact.checks import (
 )
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import CoupledStep, Iterate, carries
-from upd.contact.load_steps import CoupledHistory, LoadSteps, Reached, SolvedStep, offset_of
 from upd.errors import ConvergenceError, InputError
 from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, repr=False)
+class CoupledHistory(Shown):
+    """What the next load step must know about the one before.
+
+    Attributes
+    ----------
+    force : (n, c) ndarray
+        Forces [N]: normal, tangential.
+    slip : (n, c - 1) ndarray
+        Accumulated slip [mm]: also the way that open nodes move.
+    gap : (n,) ndarray
+        Gap [mm].
+    motion : (r,) ndarray
+        Rigid motion [mm].
+    step : (n, c - 1) ndarray
+        Slip of the last step [mm].
+    load : (r,) ndarray
+        B'f [N].
+    """
+
+    force: FloatArray
+    slip: FloatArray
+    gap: FloatArray
+    motion: FloatArray
+    step: FloatArray
+    load: FloatArray
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,8 +144,7 @@ class CoupledContact(Shown):
             path = _path(problems, self._solver, load, displacement, offset)
             problems.raise_any()
             assert path is not None
-            march = LoadSteps(self._solver, self._gap, load is not None)
-            return _march(march, path, self.history, True)
+            return _march(self._solver, self._gap, load is not None, path, self.history, True)
 
     def friction_loss(self, before: CoupledHistory) -> FloatArray:
         """Work that friction took in each step.
@@ -242,8 +270,8 @@ def coupled_contact(
         path = _path(problems, solver, load, displacement, offset)
         problems.raise_any()
         assert solver is not None and path is not None
-        march = LoadSteps(solver, h, load is not None)
-        return _march(march, path, _start(solver, h, history), history is not None)
+        start = _start(solver, h, history)
+        return _march(solver, h, load is not None, path, start, history is not None)
 
 
 def _solver(
@@ -327,24 +355,95 @@ def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> Co
     return history
 
 
+class _Reached(NamedTuple):
+    """Where a load step starts: history and offset (c n,), the load (r,) that the step before it
+    added, and whether the state may start Newton.
+    """
+
+    history: CoupledHistory
+    offset: FloatArray
+    came: FloatArray
+    warm: bool
+
+
 def _march(
-    march: LoadSteps, path: tuple[FloatArray, FloatArray], history: CoupledHistory, warm: bool
+    solver: Coulomb,
+    h: FloatArray,
+    by_load: bool,
+    path: tuple[FloatArray, FloatArray],
+    history: CoupledHistory,
+    warm: bool,
 ) -> CoupledContact:
-    solver, solved = march.solver, list[SolvedStep]()
-    at = Reached(history, offset_of(solver, march.h, history), history.load, warm)
+    # the offset that the state was found with: B s - C f - w, w = (h - g, slip)
+    w = np.concatenate((h - history.gap, history.slip.T.ravel()))
+    offset = solver.B @ history.motion - solver.C @ history.force.T.ravel() - w
+    at = _Reached(history, offset, history.load, warm)
+    answers, after, works = list[CoupledStep](), list[CoupledHistory](), list[tuple[float, float]]()
     for number, (value, offset) in enumerate(zip(*path, strict=True)):
-        one = march.step(at, value, offset)
-        if march.by_load and not one.answer.converged:
-            raise ConvergenceError(_not_carried(solver, value, number, one.answer))
-        solved.append(one)
-        at = one.reached
-    return _collected(march, solved)
+        answer, at, work = _step(solver, h, by_load, at, value, offset)
+        if by_load and not answer.converged:
+            raise ConvergenceError(_not_carried(solver, value, number, answer))
+        answers.append(answer)
+        after.append(at.history)
+        works.append(work)
+    return _collected(solver, h, answers, after, works)
 
 
-def _collected(march: LoadSteps, solved: list[SolvedStep]) -> CoupledContact:
-    answers, after = [one.answer for one in solved], [one.reached.history for one in solved]
+def _step(
+    solver: Coulomb,
+    h: FloatArray,
+    by_load: bool,
+    at: _Reached,
+    value: FloatArray,
+    offset: FloatArray,
+) -> tuple[CoupledStep, _Reached, tuple[float, float]]:
+    """To a load or motion (r,), N or mm, and an offset (c n,), mm: the answer, where it leads, its
+    work and its friction work, N mm.
+    """
+    old = at.history
+    load, motion = (value, None) if by_load else (None, value)
+    start, turned = None, False
+    if at.warm:
+        y = np.concatenate((old.gap, -old.step.T.ravel()))
+        start = Iterate(old.force.T.ravel(), old.motion, y)
+    if at.warm and load is not None:
+        # on its way; at the start of a call, whether it goes back
+        size = np.abs(solver.B).max(axis=0)
+        turned = bool((at.came / size) @ ((load - old.load) / size) < 0.0)
+    answer = solver.solve(
+        -np.concatenate((h, old.slip.T.ravel())) - offset,
+        load=load,
+        motion=motion,
+        start=start,
+        turned=turned,
+        may_fall_back=lambda: load is None or carries(solver.B, solver.mu, load),
+    )
+    f, y = (v.reshape(solver.c, solver.n) for v in (answer.at.f, answer.at.y))
+    new = CoupledHistory(
+        f.T.copy(),
+        old.slip - y[1:].T,
+        y[0].copy(),
+        answer.at.s,
+        -y[1:].T,
+        solver.B.T @ answer.at.f,
+    )
+    middle = 0.5 * (old.force + new.force).T.ravel()
+    work = 0.5 * (old.load + new.load) @ (new.motion - old.motion)
+    work -= middle @ (offset - at.offset)
+    slip_work = float((new.force[:, 1:] * (new.slip - old.slip)).sum())
+    return answer, _Reached(new, offset, new.load - old.load, True), (float(work), slip_work)
+
+
+def _collected(
+    solver: Coulomb,
+    h: FloatArray,
+    answers: Sequence[CoupledStep],
+    after: Sequence[CoupledHistory],
+    works: Sequence[tuple[float, float]],
+) -> CoupledContact:
     bad = [k for k, a in enumerate(answers) if not a.converged]
-    locking = march.solver.holds_itself
+    locking = solver.holds_itself
+    work, slip_work = np.array(works).T
     message = f"{len(after)} load steps solved."
     if bad:
         message = (
@@ -363,8 +462,8 @@ def _collected(march: LoadSteps, solved: list[SolvedStep]) -> CoupledContact:
         state=np.array([a.state for a in answers]),
         displacement=np.array([s.motion for s in after]),
         load=np.array([s.load for s in after]),
-        work=np.array([one.work for one in solved]),
-        slip_work=np.array([one.slip_work for one in solved]),
+        work=work,
+        slip_work=slip_work,
         residual=np.array([a.residual for a in answers]),
         iterations=np.array([a.iterations for a in answers]),
         fallbacks=sum(a.method == "fallback" for a in answers),
@@ -372,9 +471,9 @@ def _collected(march: LoadSteps, solved: list[SolvedStep]) -> CoupledContact:
         status="not converged" if bad else "converged",
         message=message,
         history=after[-1],
-        _solver=march.solver,
+        _solver=solver,
         _last=answers[-1].at,
-        _gap=march.h,
+        _gap=h,
     )
 
 

@@ -6,6 +6,8 @@ closed dofs alone, dense.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, lu_solve
@@ -27,11 +29,13 @@ _REFINED = 2
 Solved = tuple[FloatArray, FloatArray, FloatArray]
 
 
+@dataclass
 class Stuck:
     """Everything sticks: y = 0."""
 
-    def __init__(self, of: CoulombConditions, rows: NewtonRows, by_load: bool) -> None:
-        self.of, self.rows, self.by_load = of, rows, by_load
+    of: CoulombConditions
+    rows: NewtonRows
+    by_load: bool
 
     def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
         of = self.of
@@ -65,6 +69,8 @@ class ClosedSystem:
         self.nodes, r = nodes, of.B.shape[1] if by_load else 0
         self.dofs = (np.arange(of.c)[:, None] * of.n + nodes).ravel()
         q = self.q = len(self.dofs)
+        #: whether another factor costs more than a product with all of C
+        self.dear = q**3 / 3.0 > _PASS * len(of.C) ** 2
         if by_load and q < r:
             raise np.linalg.LinAlgError(NOT_CARRIED)
         # By rows, which are what is worked on; LAPACK sees the transpose.
@@ -112,11 +118,6 @@ class ClosedSystem:
             reciprocal, _ = lapack.dgecon(lu, norm)
             if reciprocal <= len(M) * EPS:
                 raise np.linalg.LinAlgError(NOT_CARRIED)
-
-    @property
-    def dear(self) -> bool:
-        """Whether another factor costs more than a product with all of C."""
-        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2
 
     def turned(self, right: FloatArray) -> FloatArray:
         """Q of the closed rows (q,) or (q, columns), in place."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -257,9 +257,8 @@ def contact_points(
     problems.raise_any()
     assert X is not None and K is not None
     place = np.column_stack([X, np.zeros(len(X))]) if X.shape[1] == 2 else X
-    area, force, k_n = (np.asarray(one) for one in given)
-    nodal = _Nodal(place, area, force, k_n, K)
-    cells = [nodal.cells(group, rows, columns, weight) for group in groups]
+    fields = (place, *(np.asarray(one) for one in given), K)
+    cells = [_cells([f[group] for f in fields], rows, columns, weight) for group in groups]
     law = {name: np.concatenate([cell[name] for cell in cells]) for name in cells[0]}
     m = len(law["k_n"])
     if m == 0:
@@ -315,43 +314,28 @@ def _check_patches(
     return [g.astype(np.int64) for g in groups]
 
 
-@dataclass(frozen=True)
-class _Nodal:
-    """Checked nodal fields; x (n, 3)."""
-
-    x: FloatArray
-    area: FloatArray
-    force: FloatArray
-    k_n: FloatArray
-    k_t: FloatArray
-
-    def cells(
-        self, nodes: NDArray[np.int64], rows: int, columns: int, weight: Weight
-    ) -> dict[str, FloatArray]:
-        """Fields of the contact points of one patch, row by row."""
-        part = _Nodal(*(getattr(self, field.name)[nodes] for field in fields(self)))
-        across, along = _shares(part.x[:, 1], rows), _shares(part.x[:, 0], columns)
-        share = (across[:, None, :] * along[None, :, :]).reshape(rows * columns, -1)
-        area, preload, k_n, k_t = (
-            share @ part.area,
-            share @ part.force,
-            share @ part.k_n,
-            share @ part.k_t,
-        )
-        kept = (area > 0) | (preload > 0) | (k_n > 0) | (k_t > 0).any(axis=1)
-        position = _centroids(
-            share, part.x, [part.k_n, part.area] if weight == "stiffness" else [part.area]
-        )
-        if weight == "area":
-            total = part.area.sum()
-            if not total > 0:
-                raise InputError(
-                    f"contact points: a patch of {len(nodes)} nodes has no area to share "
-                    'its stiffness by: use weight="stiffness".'
-                )
-            k_n, k_t = area / total * part.k_n.sum(), np.outer(area / total, part.k_t.sum(axis=0))
-        found = {"position": position, "k_n": k_n, "k_t": k_t, "preload": preload, "area": area}
-        return {name: values[kept] for name, values in found.items()}
+def _cells(
+    nodal: Sequence[FloatArray], rows: int, columns: int, weight: Weight
+) -> dict[str, FloatArray]:
+    """Fields of the contact points of one patch, row by row, from those of its nodes: places
+    (n, 3), areas, normal forces, stiffnesses (n,) and (n, 2).
+    """
+    x, area, _, k_n, k_t = nodal
+    across, along = _shares(x[:, 1], rows), _shares(x[:, 0], columns)
+    share = (across[:, None, :] * along[None, :, :]).reshape(rows * columns, -1)
+    position = _centroids(share, x, [k_n, area] if weight == "stiffness" else [area])
+    names = ("area", "preload", "k_n", "k_t")
+    found = {name: share @ field for name, field in zip(names, nodal[1:], strict=True)}
+    kept = (np.column_stack(list(found.values())) > 0).any(axis=1)
+    if weight == "area":
+        if not area.sum() > 0:
+            raise InputError(
+                f"contact points: a patch of {len(x)} nodes has no area to share "
+                'its stiffness by: use weight="stiffness".'
+            )
+        part = found["area"] / area.sum()
+        found |= {"k_n": part * k_n.sum(), "k_t": np.outer(part, k_t.sum(axis=0))}
+    return {name: values[kept] for name, values in {"position": position, **found}.items()}
 
 
 def _shares(x: FloatArray, count: int) -> FloatArray:

@@ -21,7 +21,7 @@ from upd.linalg.symmetric import Matrix
 from upd.mesh import Mesh
 
 if TYPE_CHECKING:
-    from upd.reduction.guyan import Condensed
+    from upd.linalg.common import Condensed
     from upd.reduction.learned import LearnedCompliance
 
     Reduced = Condensed | LearnedCompliance
@@ -299,11 +299,6 @@ class ContactModel:
         (only,) = self.patches.values()
         return only
 
-    @property
-    def first_touch(self) -> float:
-        """Approach at which the unloaded bodies touch [mm]; negative where the meshes overlap."""
-        return float(self.gap.min())
-
     def compliance(self, row: int, column: int | None = None, body: Body | None = None) -> Array:
         """Compliance at the multipliers, P' (C1 + C2) P.
 
@@ -374,8 +369,13 @@ def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) ->
     multipliers = make_multipliers(lower.mesh)
     gap = np.asarray(multipliers.spread.T @ (a[:, 2] - b[:, 2]))
     points, quads = b[multipliers.nodes], _quads(lower.mesh, multipliers)
+    sets = {
+        name.removeprefix("contact_"): nodes
+        for name, nodes in lower.mesh.nodes.items()
+        if name.startswith("contact_")
+    }
     patches = {}
-    for name, nodes in _patch_sets(lower.mesh).items():
+    for name, nodes in (sets or {"contact": lower.contact}).items():
         mine = np.flatnonzero(np.isin(lower.contact[multipliers.nodes], nodes))
         reaches = [m and bool((points[mine, k] == 0.0).any()) for k, m in enumerate(mirrored)]
         patches[name] = make_patch(
@@ -393,12 +393,3 @@ def _quads(mesh: Mesh, multipliers: Multipliers) -> NDArray[np.int64]:
         return faces[:, :4]
     quarters = [[k, 4 + k, 8, 4 + (k + 3) % 4] for k in range(4)]
     return faces[:, quarters].reshape(-1, 4)
-
-
-def _patch_sets(mesh: Mesh) -> dict[str, NDArray[np.int64]]:
-    separate = {
-        name.removeprefix("contact_"): nodes
-        for name, nodes in mesh.nodes.items()
-        if name.startswith("contact_")
-    }
-    return separate or {"contact": mesh.nodes["contact"]}

@@ -207,8 +207,16 @@ class _NormalSolver:
                 f"approach {self.closest:g} mm."
             )
             return apart(self.gap, self.closest, "no load", message)
-        mask = start if start is not None and start.any() else self._winkler(load)
-        return self._solve(mask, load=load)
+        if start is None or not start.any():
+            # The contact set of an elastic foundation as stiff as the whole patch pressed flat: too
+            # large rather than too small, free of units.
+            unit = lapack.dpotrs(self.factor, np.ones(self.n), lower=1)[0]
+            foundation, order = float(unit.sum()) / self.n, np.sort(self.h)
+            # Load carried when the foundation reaches each gap in turn.
+            before = np.concatenate(([0.0], np.cumsum(order)[:-1]))
+            carried = foundation * (np.arange(self.n) * order - before)
+            start = self.h <= order[max(int(np.searchsorted(carried, load)), 1) - 1]
+        return self._solve(np.asarray(start), load=load)
 
     def at_approach(self, approach: float, start: BoolArray | None) -> NormalContact:
         """Contact at the approach [mm]."""
@@ -250,21 +258,6 @@ class _NormalSolver:
             unclipped=answer.unclipped,
             rates=answer.rates[:, 0],
         )
-
-    def _winkler(self, load: float) -> BoolArray:
-        """Contact set of an elastic foundation as stiff as the whole patch pressed flat.
-
-        Too large rather than too small, free of units.
-        """
-        unit = lapack.dpotrs(self.factor, np.ones(self.n), lower=1)[0]
-        foundation = float(unit.sum()) / self.n
-        order = np.sort(self.h)
-        # Load carried when the foundation reaches each gap in turn.
-        carried = foundation * (
-            np.arange(self.n) * order - np.concatenate(([0.0], np.cumsum(order)[:-1]))
-        )
-        count = int(np.searchsorted(carried, load))
-        return np.asarray(self.h <= order[max(count, 1) - 1])
 
 
 def apart(gap: FloatArray, approach: float, status: str, message: str) -> NormalContact:

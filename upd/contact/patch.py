@@ -21,7 +21,7 @@ the face ends, and the area with it: a face wholly in contact has its own area e
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,11 +60,6 @@ class Patch:
     weights: Array
     mirrored: tuple[bool, bool]
     quads: NDArray[np.int64] | None = None
-
-    @property
-    def copies(self) -> int:
-        """How often the whole patch holds the model's: 1, 2 or 4."""
-        return (1 + self.mirrored[0]) * (1 + self.mirrored[1])
 
     @property
     def X(self) -> Array:
@@ -311,7 +306,7 @@ class ContactMeasures:
 def measure(
     patch: Patch,
     force: Array,
-    located: LocatedArea | None = None,
+    located: tuple[float, float] | None = None,
     pressure: Array | None = None,
 ) -> ContactMeasures:
     """Measures of one contact from its nodal forces.
@@ -321,9 +316,8 @@ def measure(
     patch : Patch
     force : (len(X), len(Y)) or (n_whole,) ndarray
         Nodal forces on the whole patch [N].
-    located : LocatedArea, optional
+    located : (area, resolution), optional
         Area with its edge located, for a contact of any shape; None takes Hertz's ellipse.
-
     pressure : (len(X), len(Y)) ndarray, optional
         At the nodes [MPa]; None takes force over tributary area.
 
@@ -342,7 +336,7 @@ def measure(
     mxx, myy = (float(m) for m in share @ away**2)
     area_nodes = float(weights[contact].sum())
     # One node alone has no second moment: its area is its own cell.
-    area = located.area if located else 5.0 * np.pi * np.sqrt(mxx * myy) or area_nodes
+    area = located[0] if located else 5.0 * np.pi * np.sqrt(mxx * myy) or area_nodes
     return ContactMeasures(
         radius_moment=float(np.sqrt(2.5 * (mxx + myy))),
         radius_area=float(np.sqrt(area_nodes / np.pi)),
@@ -351,7 +345,7 @@ def measure(
         area_nodes=area_nodes,
         max_pressure=float((force / weights if pressure is None else pressure).max()),
         mean_pressure=total / float(area),
-        area_resolution=located.resolution if located else None,
+        area_resolution=located[1] if located else None,
     )
 
 
@@ -382,23 +376,6 @@ def consistent_average(patch: Patch, field: Callable[[Array], Array], samples: i
     return np.asarray(np.einsum("ijab,a,b->ij", field(np.hypot(x, y)), hat, hat))
 
 
-@dataclass(frozen=True)
-class LocatedArea:
-    """Area of a contact.
-
-    Attributes
-    ----------
-    area : float
-        mm2.
-    resolution : float
-        Half the area of the quadrilaterals that the edge crosses [mm2]: the area lies this far from
-        the middle of what the nodes leave possible, at most. Zero for a face wholly in contact.
-    """
-
-    area: float
-    resolution: float
-
-
 def located_area(
     points: Array,
     quads: NDArray[np.int64],
@@ -406,7 +383,7 @@ def located_area(
     gap: Array,
     contact: BoolArray,
     modulus: float,
-) -> LocatedArea:
+) -> tuple[float, float]:
     """Area of the contact on quadrilaterals between nodes.
 
     Second order in the spacing for smooth edges; where a face ends or steps between two nodes, the
@@ -427,7 +404,11 @@ def located_area(
 
     Returns
     -------
-    LocatedArea
+    area : float
+        mm2.
+    resolution : float
+        Half the area of the quadrilaterals that the edge crosses [mm2]: the area lies this far from
+        the middle of what the nodes leave possible, at most. Zero for a face wholly in contact.
 
     References
     ----------
@@ -441,39 +422,14 @@ def located_area(
     crossed = quads[cut]
     whole = float(cell[closed == 4].sum())
     if not len(crossed):
-        return LocatedArea(whole, 0.0)
-    inside, opening = pressure**2, np.cbrt(0.75 * modulus * np.maximum(gap, 0.0)) ** 2
-    lines = _Lines(points, inside, opening, contact)
+        return whole, 0.0
+    # both as a length but for B: the squared pressure of closed nodes, and the opening to the power
+    # 2/3 of the others
+    away = np.where(contact, pressure**2, np.cbrt(0.75 * modulus * np.maximum(gap, 0.0)) ** 2)
     # The first pass takes the lines between nodes for normals, the second has the normals.
-    normals = _cut(lines, crossed)[1]
-    areas, _ = _cut(_Lines(points, inside, opening, contact, normals), crossed)
-    return LocatedArea(whole + areas, 0.5 * float(cell[cut].sum()))
-
-
-@dataclass(frozen=True)
-class _Lines:
-    """Lines between nodes in contact and open ones; the squared pressure and the opening to
-    the power 2/3 at the nodes, both as a length but for B.
-    """
-
-    points: Array
-    inside: Array
-    opening: Array
-    contact: BoolArray
-    cosine: dict[tuple[int, int], float] | None = None
-
-    def crossing(self, a: int, b: int) -> Array:
-        """(2,) where the edge crosses the line from ``a``, in contact, to ``b``, open."""
-        line = self.points[b] - self.points[a]
-        cosine = 1.0 if self.cosine is None else self.cosine.get(_key(a, b), 1.0)
-        length = cosine * float(np.hypot(*line))
-        return self.points[a] + line * _share(  # type: ignore[no-any-return]
-            float(self.inside[a]), float(self.opening[b]), max(length, np.finfo(float).tiny)
-        )
-
-
-def _key(a: int, b: int) -> tuple[int, int]:
-    return (a, b) if a < b else (b, a)
+    _, normals = _cut(points, away, contact, crossed, {})
+    areas, _ = _cut(points, away, contact, crossed, normals)
+    return whole + areas, 0.5 * float(cell[cut].sum())
 
 
 def _share(inside: float, opening: float, length: float) -> float:
@@ -492,9 +448,15 @@ def _share(inside: float, opening: float, length: float) -> float:
     return inside * u**3 / length
 
 
-def _cut(lines: _Lines, crossed: NDArray[np.int64]) -> tuple[float, dict[tuple[int, int], float]]:
-    """Area in contact of the quadrilaterals that the edge crosses, and line -> cosine between it
-    and the normal of the chords that end on it.
+def _cut(
+    points: Array,
+    away: Array,
+    contact: BoolArray,
+    crossed: NDArray[np.int64],
+    cosines: Mapping[tuple[int, int], float],
+) -> tuple[float, dict[tuple[int, int], float]]:
+    """Area in contact of the quadrilaterals that the edge crosses, and line from a node in contact
+    to an open one -> cosine between it and the normal of the chords that end on it.
     """
     area = 0.0
     found: dict[tuple[int, int], list[float]] = {}
@@ -502,19 +464,22 @@ def _cut(lines: _Lines, crossed: NDArray[np.int64]) -> tuple[float, dict[tuple[i
         corners, ends = [], []
         for k, node in enumerate(ring):
             after = ring[(k + 1) % 4]
-            if lines.contact[node]:
-                corners.append(lines.points[node])
-            if lines.contact[node] != lines.contact[after]:
-                pair = (node, after) if lines.contact[node] else (after, node)
-                corners.append(lines.crossing(*pair))
-                ends.append((_key(node, after), corners[-1]))
+            if contact[node]:
+                corners.append(points[node])
+            if contact[node] != contact[after]:
+                a, b = key = (node, after) if contact[node] else (after, node)
+                line = points[b] - points[a]
+                length = cosines.get(key, 1.0) * float(np.hypot(*line))
+                share = _share(float(away[a]), float(away[b]), max(length, np.finfo(float).tiny))
+                corners.append(points[a] + line * share)
+                ends.append((key, corners[-1]))
         px, py = np.array(corners).T
         area += 0.5 * abs(float(px @ np.roll(py, -1) - py @ np.roll(px, -1)))
         if len(ends) == 2:
             chord = ends[1][1] - ends[0][1]
             size = float(np.hypot(*chord))
             for key, _ in ends if size > 0.0 else ():
-                line = lines.points[key[1]] - lines.points[key[0]]
+                line = points[key[1]] - points[key[0]]
                 across = abs(float(line[0] * chord[1] - line[1] * chord[0]))
                 found.setdefault(key, []).append(across / (size * float(np.hypot(*line))))
     return area, {key: float(np.mean(c)) for key, c in found.items()}

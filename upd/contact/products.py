@@ -125,20 +125,16 @@ def _least_distance(x: Array, y: Array) -> float:
     return float(apart.min()) if apart.size else 1.0
 
 
-def learning(body: Body, components: Sequence[int]) -> LearnedCompliance | None:
-    """The body's compliance for these components where it is learned, else None."""
-    for family, (found, _) in body.condensed.items():
-        if set(components) <= set(family) and isinstance(found, LearnedCompliance):
-            return found
-    return None
-
-
 def learners(
     model: ContactModel, components: Sequence[int]
 ) -> list[tuple[Body, LearnedCompliance]]:
     """The bodies whose compliance for these components is learned, with it."""
-    bodies = (model.upper, model.lower)
-    return [(b, found) for b in bodies if (found := learning(b, components)) is not None]
+    return [
+        (body, found)
+        for body in (model.upper, model.lower)
+        for family, (found, _) in body.condensed.items()
+        if set(components) <= set(family) and isinstance(found, LearnedCompliance)
+    ]
 
 
 def _spread(model: ContactModel, body: Body, components: Sequence[int], force: Array) -> Array:

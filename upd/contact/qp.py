@@ -34,6 +34,8 @@ FREE, LOWER, UPPER = 0, -1, 1
 EPS = float(np.finfo(float).eps)
 #: half of the digits: below this share of the largest resistance a motion counts as not resisted
 HALF_THE_DIGITS = float(np.sqrt(EPS))
+# Levels of rounding do not underflow below it; no motion or force is as small.
+_TINY = float(np.finfo(float).tiny)
 # A primal-dual active set that works takes 3 to 10 steps; longer chains are handed over to the
 # least distance.
 ACTIVE_SET_STEPS = 50
@@ -237,13 +239,9 @@ class BoxQP:
                     "merge coincident contact nodes or use a compliance of better condition."
                 )
             self._factor = factor
-        self._unit = self._released(B) if index.size else B
+        self._unit = lapack.dpotrs(self._factor, B, lower=1)[0] if index.size else B
         self._stiffness = np.array([[(b * u).sum() for u in self._unit.T] for b in B.T])
         self._key = key
-
-    def _released(self, right: FloatArray) -> FloatArray:
-        """C_AA^-1 times the right-hand sides (n_A,) or (n_A, r)."""
-        return np.asarray(lapack.dpotrs(self._factor, right, lower=1)[0])
 
     def _motion(self, missing: FloatArray) -> FloatArray:
         """The least motion by which the free set takes up these resultants.
@@ -257,30 +255,13 @@ class BoxQP:
         resisted = size > HALF_THE_DIGITS * size[-1]
         return np.asarray(V[:, resisted] @ ((V.T @ missing)[resisted] / size[resisted]))
 
-    def _minimise(self, box: _Box, state: State, near: FloatArray) -> _Step | None:
-        """Minimiser with the nodes of `state` held at their bounds.
-
-        Motions that the set does not resist stay as in `near`. None when resultants are asked for
-        and no node is free.
-        """
-        self._prepare(state == FREE)
-        x = np.zeros(self.n)
-        for side, bound in ((LOWER, box.lower), (UPPER, box.upper)):
-            held = state == side
-            x[held] = bound[held]
-        if box.motion is None and not self._index.size:
-            return None
-        s = near if box.motion is None else box.motion
-        start = (box.h + self.product(x) if x.any() else box.h) - self.B @ s
-        return self._corrected(box, x, s, start)
-
     def _corrected(self, box: _Box, x: FloatArray, s: FloatArray, residual: FloatArray) -> _Step:
         """One solve with the factor at hand: no residual at free nodes, and the resultants; with
         the residual that it leaves and its rounding level n eps (|h| + |B||s| + |C||x|).
         """
         index, x, more = self._index, x.copy(), np.zeros(self.B.shape[1])
         if index.size:
-            y = self._released(residual[index])
+            y = np.asarray(lapack.dpotrs(self._factor, residual[index], lower=1)[0])
             if box.load is not None:
                 freed = np.array([(b * y).sum() for b in self.B[index].T])
                 more = self._motion(box.load - self._resultants(x) + freed)
@@ -289,7 +270,7 @@ class BoxQP:
         rigid = np.abs(self.B) @ np.abs(s)
         terms = np.abs(box.h) + rigid + self._row * float(np.abs(x).sum())
         left = box.h + self.product(x) - self.B @ s
-        return _Step(x, left, s, np.asarray(self._rounding * terms))
+        return _Step(x, left, s, np.asarray(self._rounding * terms + _TINY))
 
     def _refined(self, box: _Box, step: _Step | None, state: State) -> _Step | None:
         """Iterative refinement of a step.
@@ -302,27 +283,21 @@ class BoxQP:
         self._prepare(state == FREE)
         return self._corrected(box, step.x, step.motion, step.residual)
 
-    def _bound_tolerance(self, step: _Step) -> FloatArray:
-        """Rounding level of x.
-
-        So small that n nodes moved by it stay inside the residual tolerance.
-        """
-        return np.asarray(step.tolerance / (self.n * self._row))
-
     def _solved(self, box: _Box, step: _Step, state: State) -> bool:
         """KKT conditions within the rounding level, whatever method finished."""
         # The Cholesky solve and the product each leave an error of this size: allow for both, and
         # for the clipping of x.
         tolerance = 4 * step.tolerance
-        slack = 4 * self.n * self._bound_tolerance(step)
+        slack = tolerance / self._row
         g = step.residual
         kkt = np.where(state == FREE, np.abs(g), np.where(state == LOWER, -g, g)) <= tolerance
         inside = (step.x >= box.lower - slack) & (step.x <= box.upper + slack)
         if box.load is None:
             return bool(np.all(kkt & inside))
         arms = np.abs(self.B).max(axis=0)
-        balance = np.abs(self._resultants(step.x) - box.load) <= 4 * self._rounding * (
-            np.abs(box.load) + arms * np.abs(step.x).sum()
+        balance = (
+            np.abs(self._resultants(step.x) - box.load)
+            <= 4 * self._rounding * (np.abs(box.load) + arms * np.abs(step.x).sum()) + _TINY
         )
         return bool(np.all(kkt & inside) and np.all(balance))
 
@@ -333,6 +308,9 @@ class BoxQP:
     ) -> tuple[_Step | None, State, int, str]:
         """Primal-dual active set: fast, but may cycle, which the visited sets reveal.
 
+        Each step minimises with the nodes of `state` held at their bounds; motions that the set
+        does not resist stay as in `near`.
+
         References
         ----------
         M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2002) 865.
@@ -341,13 +319,17 @@ class BoxQP:
         step: _Step | None = None
         for used in range(1, limit + 1):
             visited.add(state.tobytes())
-            now = self._minimise(box, state, near)
-            if now is None and self.B.shape[1] > 1:
-                return None, state, used, "no node is free"
-            if now is None:
+            self._prepare(state == FREE)
+            if box.motion is None and not self._index.size:
+                if self.B.shape[1] > 1:
+                    return None, state, used, "no node is free"
                 new = self._last_to_yield(box, state)
             else:
-                step, near, new = now, now.motion, self._next_state(box, now, state)
+                x = np.where(state == LOWER, box.lower, np.where(state == UPPER, box.upper, 0.0))
+                s = near if box.motion is None else box.motion
+                left = (box.h + self.product(x) if x.any() else box.h) - self.B @ s
+                step = self._corrected(box, x, s, left)
+                near, new = step.motion, self._next_state(box, step, state)
                 if np.array_equal(new, state):
                     return step, state, used, "converged"
             if new.tobytes() in visited:
@@ -360,7 +342,8 @@ class BoxQP:
 
         Held nodes whose residual has the wrong sign are freed.
         """
-        slack = self._bound_tolerance(step)
+        # The rounding level of x: n nodes moved by it stay inside the tolerance of the residual.
+        slack = step.tolerance / (self.n * self._row)
         new = state.copy()
         free = state == FREE
         new[free & (step.x <= box.lower + slack)] = LOWER

@@ -73,7 +73,8 @@ def most_stressed(x: Array, y: Array, tractions: Sequence[Array], nu: float) -> 
     MostStressed
     """
     x, y, fields = _even(x, y, tractions)
-    cells = [_cells(field) for field in fields]
+    # every cell has the mean of its four nodes
+    cells = [0.25 * (f[1:, 1:] + f[1:, :-1] + f[:-1, 1:] + f[:-1, :-1]) for f in fields]
     found = _search(x, y, cells, nu)
     coarse = _search(*_paired(x, y, cells), nu)
     change = abs(coarse[0] / found[0] - 1.0) if found[0] > 0.0 else 0.0
@@ -122,11 +123,6 @@ def _even(x: Array, y: Array, fields: Sequence[Array]) -> tuple[Array, Array, li
     return X, Y, [RegularGridInterpolator((x, y), field)(at) for field in given]
 
 
-def _cells(field: Array) -> Array:
-    """Mean of the four nodes of every cell."""
-    return 0.25 * (field[1:, 1:] + field[1:, :-1] + field[:-1, 1:] + field[:-1, :-1])
-
-
 def _paired(x: Array, y: Array, cells: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
     """Cells twice as large with the same forces; an odd last one is paired with an empty one."""
     wide = [v[0] + 2.0 * float(v[1] - v[0]) * np.arange(len(v) // 2 + 1) for v in (x, y)]
@@ -151,8 +147,12 @@ def _search(x: Array, y: Array, cells: Sequence[Array], nu: float) -> tuple[floa
     offsets = np.meshgrid(
         step[0] * np.arange(1 - n, n), step[1] * np.arange(1 - m, m), indexing="ij"
     )
+    # The surface, and depths down to half the narrower width of the contact: the deepest maximum,
+    # under a line contact of half width b, lies at 0.79 b (Johnson, section 4.2).
+    top, width = _SHALLOWEST * float(step.min()), float((step * inside[0].shape).min())
+    count = int(np.ceil(np.log(max(0.5 * width, float(step.min())) / top) / np.log(_DEPTHS))) + 1
     best, place = 0.0, np.zeros(3)
-    for depth in _depths(float(step.min()), float((step * inside[0].shape).min())):
+    for depth in (0.0, *(top * _DEPTHS ** np.arange(count))):
         stress = _stress(offsets, depth, 0.5 * step, inside, nu)
         values = von_mises(stress)
         i, j = np.unravel_index(int(values.argmax()), values.shape)
@@ -161,17 +161,6 @@ def _search(x: Array, y: Array, cells: Sequence[Array], nu: float) -> tuple[floa
             corner = np.array([x[first[0]], y[first[1]]])
             place = np.array([*(corner + step * (np.array([i, j]) + 0.5)), depth])
     return best, place
-
-
-def _depths(step: float, width: float) -> Array:
-    """The surface, and depths down to half the narrower width of the contact.
-
-    The deepest maximum, under a line contact of half width b, lies at 0.79 b (Johnson, section
-    4.2); deeper stresses fall.
-    """
-    first, last = _SHALLOWEST * step, max(0.5 * width, step)
-    count = int(np.ceil(np.log(last / first) / np.log(_DEPTHS))) + 1
-    return np.concatenate([[0.0], first * _DEPTHS ** np.arange(count)])
 
 
 def _stress(

@@ -323,10 +323,10 @@ class _TangentialSolver:
     def __init__(self, problems: Problems, compliance: ArrayLike, limit: ArrayLike) -> None:
         C, L = compliance_matrix(problems, compliance)
         s = numbers(problems, "limit", limit, ("n",))
-        self.directions, self.limit = 1, np.zeros(0)
+        self.directions, self.limit, self.n = 1, np.zeros(0), 0
         if s is None:
             return
-        self.limit = s
+        self.limit, self.n = s, s.size
         negative = np.flatnonzero(s < 0)
         problems.add(
             negative.size > 0,
@@ -356,10 +356,6 @@ class _TangentialSolver:
                 n = self.carried.size
                 rigid = np.asarray(np.kron(np.eye(2), np.ones((n, 1))), np.float64)
                 self.disks = Coulomb(inner, rigid, np.ones(n), L, self.bound)
-
-    @property
-    def n(self) -> int:
-        return self.limit.size
 
     def targets(
         self,
@@ -415,7 +411,12 @@ class _TangentialSolver:
         before = at.slip[self.dofs]
         load, motion = (value, None) if by_load else (None, value)
         if not self.carried.size:
-            answer = self._frictionless(motion)
+            # the bodies slide past each other by the displacement; a load can only be zero
+            r, none = self.directions, np.zeros(0)
+            d = np.zeros(r) if motion is None else np.atleast_1d(motion)
+            zero, state = np.zeros((r, r)), np.zeros(0, dtype=np.int8)
+            rates = np.zeros((0, r))
+            answer = ForceSolution(none, none, d, state, 0, "active set", zero, none, rates)
         elif self.directions == 1:
             answer = self.box.solve(
                 before,
@@ -461,16 +462,6 @@ class _TangentialSolver:
         state = slips.astype(np.int8)
         K = solver.B.T @ rates
         return ForceSolution(x, y, s, state, found.iterations, method, K, found.at.f, rates)
-
-    def _frictionless(self, motion: FloatArray | None) -> ForceSolution:
-        """No node can carry traction: the bodies slide past each other by the displacement.
-
-        A load can only be zero.
-        """
-        r, none = self.directions, np.zeros(0)
-        d = np.zeros(r) if motion is None else np.atleast_1d(motion)
-        zero, state = np.zeros((r, r)), np.zeros(0, dtype=np.int8)
-        return ForceSolution(none, none, d, state, 0, "active set", zero, none, np.zeros((0, r)))
 
     def _result(
         self, at: TangentialHistory, answer: ForceSolution, load: FloatArray | None

@@ -178,17 +178,9 @@ def _unloaded(problems: Problems, h: FloatArray, M: FloatArray) -> TiltedContact
     return TiltedContact(normal, none, none, "no load", message, np.zeros((3, 3)))
 
 
-@dataclass(frozen=True)
-class _Face:
-    """Part of the hull under the load line.
-
-    Its nodes, and the directions (2, k) in which they can balance a moment, k = 2, 1 or 0; `across`
-    are the other ones.
-    """
-
-    nodes: NDArray[np.intp]
-    along: FloatArray
-    across: FloatArray
+#: part of the hull under the load line: its nodes, the directions (2, k) in which they can balance
+#: a moment, k = 2, 1 or 0, and the other ones
+_Face = tuple[NDArray[np.intp], FloatArray, FloatArray]
 
 
 def _sides(problems: Problems, T: FloatArray, tilts: FloatArray) -> FloatArray:
@@ -232,11 +224,11 @@ def _supporting_face(
     sides = sides[beyond >= -tolerance]
     nodes = np.flatnonzero((np.abs(T @ sides[:, :2].T + sides[:, 2]) <= tolerance).all(axis=1))
     if not len(sides):
-        return _Face(nodes, tilts, np.zeros((2, 0)))
+        return nodes, tilts, np.zeros((2, 0))
     if np.ptp(T[nodes], axis=0).max(initial=0.0) <= tolerance:
-        return _Face(nodes, np.zeros((2, 0)), tilts)
+        return nodes, np.zeros((2, 0)), tilts
     normal = sides[0, :2]
-    return _Face(nodes, np.array([[-normal[1]], [normal[0]]]), normal[:, None])
+    return nodes, np.array([[-normal[1]], [normal[0]]]), normal[:, None]
 
 
 def _solve(
@@ -253,14 +245,14 @@ def _solve(
 
     The least tilt that opens all other nodes.
     """
-    n, S, closest = h.size, face.nodes, float(h.min())
+    n, closest, (S, along, across) = h.size, float(h.min()), face
     # About the load point every moment is zero; gaps count from the closest pair, so that a common
     # offset costs no digits.
     arms, gap = T - M / F, h - closest
     whole = len(S) == n
-    along = arms[S] @ face.along
-    size = np.abs(along).max(axis=0)
-    qp = BoxQP(C if whole else C[np.ix_(S, S)], np.column_stack([np.ones(len(S)), along / size]))
+    rigid = arms[S] @ along
+    size = np.abs(rigid).max(axis=0)
+    qp = BoxQP(C if whole else C[np.ix_(S, S)], np.column_stack([np.ones(len(S)), rigid / size]))
     load, none = np.zeros(1 + len(size)), np.zeros(len(S))
     load[0] = F
     start = np.where(mask[S] | (not mask[S].any()), FREE, LOWER).astype(np.int8)
@@ -268,17 +260,17 @@ def _solve(
     approach = float(answer.motion[0])
     force, unclipped, contact = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
     force[S], unclipped[S], contact[S] = answer.x, answer.unclipped, answer.state == FREE
-    tilt = face.along @ (answer.motion[1:] / size)
+    tilt = along @ (answer.motion[1:] / size)
     residual = np.zeros(n)
     if not whole:
         residual = gap + C @ force - approach - arms @ tilt
         off = np.setdiff1d(np.arange(n), S)
-        more = _least_opening(arms[off] @ face.across, residual[off])
-        tilt, residual = tilt + face.across @ more, residual - arms @ face.across @ more
+        more = _least_opening(arms[off] @ across, residual[off])
+        tilt, residual = tilt + across @ more, residual - arms @ across @ more
     residual[S] = answer.residual
     # the nodes that carry lie on the face: its rigid motions are theirs, about the load point
     turned = np.eye(1 + len(size), 3)
-    turned[0, 1:], turned[1:, 1:] = M / F, size[:, None] * face.along.T
+    turned[0, 1:], turned[1:, 1:] = M / F, size[:, None] * along.T
     K = turned.T @ answer.stiffness @ turned
     unique = bool(
         np.linalg.matrix_rank(T[contact] - T[contact].mean(axis=0), tol=HALF_THE_DIGITS * np.ptp(T))

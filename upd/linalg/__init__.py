@@ -5,7 +5,7 @@ Each is a function that returns an array, a result of arrays, or a function.
 
 from upd.linalg.amg import amg_solve as amg_solve
 from upd.linalg.amg import compliance_amg as compliance_amg
-from upd.linalg.common import Condensation as Condensation
+from upd.linalg.common import Condensed as Condensed
 from upd.linalg.common import Factor as Factor
 from upd.linalg.eigen import Eigenproblem as Eigenproblem
 from upd.linalg.eigen import modes as modes

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,9 +11,11 @@ from upd.errors import InputError
 from upd.linalg.common import (
     AT_ONCE,
     MAX_ITERATIONS,
+    Condensed,
     FloatArray,
     checked_dofs,
     checked_vectors,
+    inverse_definite,
     log,
 )
 from upd.linalg.schur import Solved
@@ -74,30 +74,12 @@ def amg_solve(
         raise InputError(
             f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case."
         )
-    found = MultigridSolver(
+    solver = MultigridSolver(
         A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
-    )(b, rtol)
+    )
+    (found,) = solver.many(b[:, None], rtol)
     log.info("amg: %d dofs, Converged in %d iterations", A.shape[0], found.iterations)
     return found
-
-
-@dataclass(frozen=True)
-class AmgCompliance:
-    """Compliance at some dofs by multigrid.
-
-    Attributes
-    ----------
-    C : (k, k) ndarray
-        mm/N, exactly symmetric.
-    iterations : int
-        Most for a column.
-    solve : callable
-        Forces f_b (k,) at these dofs -> displacements u (n,).
-    """
-
-    C: FloatArray
-    iterations: int
-    solve: Callable[[FloatArray], FloatArray]
 
 
 def compliance_amg(
@@ -107,10 +89,9 @@ def compliance_amg(
     *,
     layout: ArrayLike | None = None,
     points: ArrayLike | None = None,
-) -> AmgCompliance:
-    """Compliance C = (K^-1)_bb at some dofs, a few columns at a time: k solutions, memory of a few.
-
-    The inverse of C is the Schur complement of K on the dofs.
+) -> Condensed:
+    """Body condensed by its compliance C = (K^-1)_bb at some dofs, a few columns at a time: k
+    solutions, memory of a few. The inverse of C is the Schur complement of K on the dofs.
 
     Parameters
     ----------
@@ -123,7 +104,7 @@ def compliance_amg(
 
     Returns
     -------
-    AmgCompliance
+    Condensed
 
     Raises
     ------
@@ -146,9 +127,15 @@ def compliance_amg(
             most = max(most, found.iterations)
     log.info("amg: %d columns at %d dofs, at most %d iterations each", len(b), A.shape[0], most)
 
-    def solve(force: FloatArray) -> FloatArray:
-        f = np.zeros(A.shape[0])
-        f[b] = checked_vectors(force, len(b), "force at the kept dofs")
-        return solver(f, RTOL).x
+    C = 0.5 * (C + C.T)
+    C.flags.writeable = False
+    S = inverse_definite(C)
 
-    return AmgCompliance(0.5 * (C + C.T), most, solve)
+    def recover(u_kept: FloatArray) -> FloatArray:
+        force = S @ checked_vectors(u_kept, len(b), "displacement of the kept dofs")
+        f = np.zeros((A.shape[0], *force.shape[1:]))
+        f[b] = force
+        u = [one.x for one in solver.many(f.reshape(len(f), -1), RTOL)]
+        return np.asarray(u).T.reshape(f.shape)
+
+    return Condensed(S, recover, "amg", 0, 0, A.shape[0], [C])

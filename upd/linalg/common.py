@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lapack
 from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
@@ -35,21 +36,24 @@ _CHECKED = "_upd_checked"
 
 
 @dataclass(frozen=True, repr=False)
-class Condensation(Shown):
-    """Schur complement of a stiffness on the kept dofs.
+class Condensed(Shown):
+    """A body condensed on k kept dofs: loads elsewhere are zero.
 
     Attributes
     ----------
     S : (k, k) ndarray
-        K_bb - K_bi K_ii^-1 K_ib in N/mm, exactly symmetric, in the order of the kept dofs.
+        Schur complement K_bb - K_bi K_ii^-1 K_ib in N/mm, exactly symmetric, in the order of the
+        kept dofs.
     recover : callable
         u_b (k,) or (k, m) -> u (n,) or (n, m) with u_i = -K_ii^-1 K_ib u_b.
     solver : str
         Name of the solver that ran.
     factor_nnz : int
-        Non-zeros of one triangle of the factor.
+        Non-zeros of one triangle of the factor (0 with multigrid: not known).
     peak_bytes : int
         Largest memory of the solver, its own count.
+    n_dof : int
+        n.
     """
 
     S: FloatArray
@@ -57,6 +61,48 @@ class Condensation(Shown):
     solver: str
     factor_nnz: int
     peak_bytes: int
+    n_dof: int
+    _compliance: list[FloatArray] = field(default_factory=list, repr=False)
+
+    def compliance(self) -> FloatArray:
+        """Compliance at the kept dofs; computed once, by Cholesky.
+
+        Returns
+        -------
+        (k, k) ndarray
+            S^-1 in mm/N, exactly symmetric, read-only.
+
+        Raises
+        ------
+        ConvergenceError
+            When S is not positive definite: the body floats.
+        """
+        if not self._compliance:
+            self._compliance.append(inverse_definite(self.S))
+        return self._compliance[0]
+
+    def under(self, force: FloatArray) -> FloatArray:
+        """Displacements u (n,) of all dofs of K under forces (k,) at the kept ones."""
+        return self.recover(self.compliance() @ force)
+
+
+def inverse_definite(S: FloatArray) -> FloatArray:
+    """Inverse of a symmetric positive definite matrix by LAPACK potrf and potri.
+
+    Raises ConvergenceError when it is not definite.
+    """
+    factor, info = lapack.dpotrf(np.asfortranarray(S), lower=1)
+    if info == 0:
+        inverse, info = lapack.dpotri(factor, lower=1)
+    if info != 0:
+        raise ConvergenceError(
+            f"The condensed stiffness is not positive definite (row {abs(info) - 1}): the "
+            "body floats. To fix it: hold the distant set."
+        )
+    lower = np.tril(inverse)
+    full: FloatArray = lower + np.tril(inverse, -1).T
+    full.flags.writeable = False
+    return full
 
 
 @dataclass(frozen=True)
@@ -82,22 +128,6 @@ class Factor:
 
     def __call__(self, rhs: FloatArray) -> FloatArray:
         return self.solve(rhs)
-
-
-@dataclass(frozen=True)
-class SignedFactor:
-    """A factor L D L' of a symmetric matrix that need not be definite.
-
-    Attributes
-    ----------
-    negative : int
-        Negative eigenvalues of the matrix (Sylvester's law of inertia).
-    solve : callable
-        Right-hand sides (n,) or (n, m) -> A^-1 rhs.
-    """
-
-    negative: int
-    solve: Solve
 
 
 def checked_matrix(K: Any) -> csr_array:
@@ -340,30 +370,21 @@ def row_blocks(A: csr_array) -> Iterator[tuple[int, int]]:
         first = last
 
 
-@dataclass(frozen=True)
-class Motion:
-    """The softest motion found.
+def is_free(vector: FloatArray, energy: float) -> bool:
+    """Whether the relative energy of a motion is rounding.
 
-    Attributes
+    A Cholesky factor of n dofs is that of a matrix changed by about sqrt(n) eps.
+
+    Parameters
     ----------
-    vector : (n,) ndarray
+    vector : (n, ...) ndarray
     energy : float
-        v'Kv / v'Dv, D the diagonal of K (1 when the dofs move on their own).
+        v'Kv / v'Dv, D the diagonal of K.
     """
-
-    vector: FloatArray
-    energy: float
-
-    @property
-    def is_free(self) -> bool:
-        """Whether its energy is rounding.
-
-        A Cholesky factor of n dofs is that of a matrix changed by about sqrt(n) eps.
-        """
-        return not self.energy > 10 * EPS * np.sqrt(len(self.vector))
+    return not energy > 10 * EPS * np.sqrt(len(vector))
 
 
-def softest_motion(K: Any, solve: Solve) -> Motion:
+def softest_motion(K: Any, solve: Solve, D: FloatArray | None = None) -> tuple[FloatArray, float]:
     """Softest motion of a body, by two steps of inverse iteration with the factor of K.
 
     Scaled by the diagonal of K, so that stiff parts do not hide soft ones. Enough for a free
@@ -371,35 +392,42 @@ def softest_motion(K: Any, solve: Solve) -> Motion:
 
     Parameters
     ----------
-    K : (n, n) Symmetric or csr_array
+    K : (n, n) Symmetric, csr_array or ndarray
     solve : callable
         Right-hand side (n,) -> K^-1 rhs.
+    D : (n,) ndarray, optional
+        Stiffness of the dofs whose rounding K carries; None: its diagonal.
 
     Returns
     -------
-    Motion
+    v : (n,) ndarray
+    energy : float
+        v'Kv / v'Dv (1 when the dofs move on their own).
 
     References
     ----------
     .. [1] N. J. Higham, Accuracy and Stability of Numerical Algorithms, ch. 15.
     """
-    D = K.diagonal()
+    D = K.diagonal() if D is None else D
     v = np.random.default_rng(0).standard_normal(K.shape[0]) / np.sqrt(D)
     for _ in range(2):
         w = solve(D * v)
         size = float(np.sqrt(w @ (D * w)))
         if not (np.isfinite(size) and size > 0.0):
-            return Motion(v, 0.0)
+            return v, 0.0
         v = w / size
-    return Motion(v, float(v @ (K @ v)))
+    return v, float(v @ (K @ v))
 
 
-def inner_free_error(motion: Motion | None, numbers: IntArray, solver: str) -> ConvergenceError:
+def inner_free_error(
+    motion: tuple[FloatArray, float] | None, numbers: IntArray, solver: str
+) -> ConvergenceError:
     """The error for a K_ii that cannot be factorised.
 
     Parameters
     ----------
-    motion : Motion or None
+    motion : (ndarray, float) or None
+        From `softest_motion`.
     numbers : (n,) array of int
         Dofs of the motion's entries.
     solver : str
@@ -411,9 +439,9 @@ def inner_free_error(motion: Motion | None, numbers: IntArray, solver: str) -> C
     """
     where = ""
     if motion is not None:
-        most = int(numbers[np.argmax(np.abs(motion.vector))])
+        most = int(numbers[np.argmax(np.abs(motion[0]))])
         where = (
-            f" Dof {most} moves most in the free motion, whose energy is {motion.energy:.1e} "
+            f" Dof {most} moves most in the free motion, whose energy is {motion[1]:.1e} "
             "of its dofs' own."
         )
     return ConvergenceError(

@@ -20,9 +20,9 @@ from scipy.linalg import eigh
 
 from upd.errors import ConvergenceError, InputError
 from upd.labels import Shown
-from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_vectors, log
+from upd.linalg.common import EPS, Factor, FloatArray, checked_vectors, is_free, log
 from upd.linalg.eigen_checks import Modes, checked_mass, finished, ritz
-from upd.linalg.inertia import Count, about_how_many, count_modes
+from upd.linalg.inertia import about_how_many, count_modes
 from upd.linalg.lanczos import BLOCK, MAX_BLOCKS, Operator, block_lanczos
 from upd.linalg.schur import factorise
 from upd.linalg.select import memory_left
@@ -263,11 +263,27 @@ class Eigenproblem(Shown):
         return self._factor().factor(loads)
 
     def _lowest(self, count: int) -> Modes:
-        """At least `count` lowest modes, not yet checked."""
-        self._refuse_size(count)
-        if self.solver == "dense" or (self.solver == "auto" and _is_dense(self.n, count)):
+        """At least `count` lowest modes, not yet checked: Lanczos for some more, or all of them.
+
+        Raises InputError before memory runs out: needed are a basis of three vectors per mode, or
+        three dense matrices.
+        """
+        dense = self.solver == "dense" or 3 * count > self.n_massive
+        need = 24.0 * self.n * (self.n if dense else count)
+        if need > memory_left():
+            raise InputError(
+                f"{count} modes of {self.n} dofs need {need / 1e9:.1f} GB: ask for fewer "
+                "modes, or a lower frequency limit."
+            )
+        small = self.n <= DENSE or (self.n <= DENSE_MANY and 4 * count >= self.n)
+        asked = min(self.n_massive, count + 2 + count // 8)
+        if (
+            self.solver == "dense"
+            or (self.solver == "auto" and small)
+            or 2 * asked > self.n_massive
+        ):
             return self._dense(count)
-        return self._lanczos(count)
+        return self.some_modes(self._placed(self._factor(), asked), asked, MAX_BLOCKS)
 
     def _below(self, found: Modes, below_hz: float) -> int:
         """About how many modes lie below the limit.
@@ -286,19 +302,6 @@ class Eigenproblem(Shown):
             )
         return there
 
-    def _refuse_size(self, count: int) -> None:
-        """Raise InputError before memory runs out.
-
-        Needed are a basis of three vectors per mode, or three dense matrices.
-        """
-        dense = self.solver == "dense" or 3 * count > self.n_massive
-        need = 24.0 * self.n * (self.n if dense else count)
-        if need > memory_left():
-            raise InputError(
-                f"{count} modes of {self.n} dofs need {need / 1e9:.1f} GB: ask for fewer "
-                "modes, or a lower frequency limit."
-            )
-
     def _dense(self, count: int) -> Modes:
         """All modes by LAPACK from M x = theta (K - sigma M) x.
 
@@ -311,19 +314,11 @@ class Eigenproblem(Shown):
         except np.linalg.LinAlgError as error:
             raise _not_definite(sigma) from error
         # A singular matrix can pass LAPACK's test by rounding: the softest motion shows it.
-        if Motion(
-            X[:, -1], float(X[:, -1] @ (A @ X[:, -1]) / (X[:, -1] @ (A.diagonal() * X[:, -1])))
-        ).is_free:
+        v = X[:, -1]
+        if is_free(v, float(v @ (A @ v) / (v @ (A.diagonal() * v)))):
             raise _not_definite(sigma)
         X = X[:, -count:][:, theta[-count:] > self.n * EPS * theta[-1]]
         return ritz(self.K, self.M, X, "dense", sigma, self._size)
-
-    def _lanczos(self, count: int) -> Modes:
-        """Lanczos for `count` modes and some more, again where the shift was a bad guess."""
-        asked = min(self.n_massive, count + 2 + count // 8)
-        if 2 * asked > self.n_massive:
-            return self._dense(count)
-        return self.some_modes(self._placed(self._factor(), asked), asked, MAX_BLOCKS)
 
     def _placed(self, inverse: _Inverse, count: int) -> _Inverse:
         """The factor, its guessed shift moved to where a few blocks show the spectrum to begin."""
@@ -353,7 +348,9 @@ class Eigenproblem(Shown):
         limit = 0.0 if below_hz is None else (2.0 * np.pi * below_hz) ** 2
         # With a limit only the modes below it are wanted, or as many as were asked for.
         keep = _kept(found, wanted, below_hz)
-        count = self._counted(found, keep, limit if keep < wanted else 0.0)
+        self._make_room()
+        limit = limit if keep < wanted else 0.0
+        count = count_modes(self.K, self.M, found, keep, limit, found.solver)
         if count is None:
             return self._searched(self._factor(), found, wanted)
         frequency = np.sqrt(count.sigma) / (2.0 * np.pi)
@@ -372,11 +369,6 @@ class Eigenproblem(Shown):
         if self._inverse and (self.alone or 2 * self._inverse[0].factor.peak_bytes > memory_left()):
             self._inverse.clear()
 
-    def _counted(self, found: Modes, keep: int, limit: float) -> Count | None:
-        """The inertia above the first `keep` modes and above `limit`."""
-        self._make_room()
-        return count_modes(self.K, self.M, found, keep, limit, found.solver)
-
     def _searched(self, inverse: _Inverse, found: Modes, count: int) -> Modes:
         """With what the run missed, searched M-orthogonally to the modes found.
 
@@ -385,9 +377,12 @@ class Eigenproblem(Shown):
         # Each pass adds at least one mode, so this ends; more passes than modes wanted mean that
         # something is wrong.
         for step in range(1, count + 2):
-            if self._is_complete(
-                found, self._more(inverse, found, 1, step, _CHECK_TOLERANCE), count
-            ):
+            # What turns up above the wanted modes was not missed; what turns up below pushes the
+            # last one down.
+            before = found.eigenvalue[:count]
+            after = self._more(inverse, found, 1, step, _CHECK_TOLERANCE).eigenvalue[:count]
+            near = 1e-6 * abs(found.sigma)
+            if len(before) == len(after) and np.allclose(after, before, rtol=1e-6, atol=near):
                 return found.with_proof(_SEARCH, 0)
             found = self._more(inverse, found, _CHECK_BLOCK, step, _TOLERANCE)
         return found.with_proof(_SEARCH, 1)
@@ -399,17 +394,6 @@ class Eigenproblem(Shown):
         extra = self._krylov(inverse, count, found, seed, tolerance)
         both = np.hstack([found.shapes, inverse.factor(self.M @ extra)])
         return ritz(self.K, self.M, both, found.solver, found.sigma, self._size)
-
-    def _is_complete(self, found: Modes, joined: Modes, count: int) -> bool:
-        """Whether no wanted mode was missed.
-
-        What turns up above the wanted modes is not missed; what turns up below pushes the last one
-        down.
-        """
-        before, kept = found.eigenvalue[:count], joined.eigenvalue[:count]
-        return len(before) == len(kept) and bool(
-            np.allclose(kept, before, rtol=1e-6, atol=1e-6 * abs(found.sigma))
-        )
 
     def _factor(self) -> _Inverse:
         """The factor for the shift asked for.
@@ -456,7 +440,15 @@ class Eigenproblem(Shown):
         block = min(BLOCK if found is None else _CHECK_BLOCK, self.n_massive)
         start = solve(self.M @ np.random.default_rng(seed).standard_normal((self.n, block)))
         if found is not None:
-            start, solve = _deflated(found, self.M, inverse.factor, start)
+            # without the part in the modes found, after the inverse
+            X, MX = found.shapes, self.M @ found.shapes
+
+            def solve(b: FloatArray) -> FloatArray:
+                x = inverse.factor(b)
+                return np.asarray(x - X @ (MX.T @ x))
+
+            for _ in range(2):
+                start = start - X @ (MX.T @ start)
         made = block_lanczos(solve, self.M, start, count, tolerance, max_blocks)
         log.info(
             "block Lanczos: %d vectors in %d blocks of %d, sigma %.3g",
@@ -484,28 +476,11 @@ def _better_shift(found: Modes, sigma: float) -> float:
     return sigma if -10.0 * first <= sigma <= -0.01 * first else -first
 
 
-def _deflated(
-    found: Modes, M: Matrix, solve: Factor, start: FloatArray
-) -> tuple[FloatArray, Operator]:
-    """Start and inverse without the part in the modes found: x - X X'M x, after the inverse."""
-    X, MX = found.shapes, M @ found.shapes
-
-    def project(x: FloatArray) -> FloatArray:
-        out: FloatArray = x - X @ (MX.T @ x)
-        return out
-
-    return project(project(start)), lambda b: project(solve(b))
-
-
 def _kept(found: Modes, wanted: int, below_hz: float | None) -> int:
     """How many of the modes found are answered with."""
     if below_hz is None:
         return wanted
     return int(np.searchsorted(found.frequency[:wanted], below_hz, side="right"))
-
-
-def _is_dense(n: int, count: int) -> bool:
-    return n <= DENSE or (n <= DENSE_MANY and 4 * count >= n)
 
 
 def _scale(K: Matrix, M: Matrix) -> float:

@@ -14,14 +14,13 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from upd.errors import ConvergenceError
-from upd.linalg.common import FloatArray, SignedFactor, log
+from upd.linalg.common import FloatArray, Solve, log
 from upd.linalg.eigen_checks import Modes
 from upd.linalg.pardiso import signed_pardiso
 from upd.linalg.superlu import signed_superlu
@@ -79,14 +78,24 @@ def count_modes(
     Count or None
         None when there is no gap, or no factor to be trusted.
     """
-    for sigma in _shifts(found, keep, limit):
+    # The widest gap above the modes wanted, relative to its upper end.
+    value = found.eigenvalue
+    low = np.maximum(np.concatenate([[0.0], value])[keep:-1], limit)
+    high = value[keep:]
+    width = (high - low) / np.maximum(high, np.finfo(np.float64).tiny)
+    # Rounding of the eigenvalues themselves must be no matter.
+    if not width.size or width.max() < np.sqrt(np.finfo(np.float64).eps):
+        return None
+    j = int(np.argmax(width))
+    for place in _PLACES:
+        sigma = float(low[j] + place * (high[j] - low[j]))
         try:
             factor = _factor(K, M, sigma, solver)
         except ConvergenceError as error:
             log.info("no inertia at %.6g (rad/s)^2: %s", sigma, error)
             return None
-        if factor is not None and _stands_clear(M, found, sigma, factor):
-            return Count(sigma, factor.negative)
+        if factor is not None and _stands_clear(M, found, sigma, factor[1]):
+            return Count(sigma, factor[0])
     return None
 
 
@@ -96,30 +105,17 @@ def about_how_many(K: Matrix, M: Matrix, limit: float, solver: str) -> int:
     """
     with suppress(ConvergenceError):
         factor = _factor(K, M, limit, solver)
-        return factor.negative if factor is not None else 0
+        return factor[0] if factor is not None else 0
     return 0
 
 
-def _factor(K: Matrix, M: Matrix, sigma: float, solver: str) -> SignedFactor | None:
+def _factor(K: Matrix, M: Matrix, sigma: float, solver: str) -> tuple[int, Solve] | None:
+    """Eigenvalues below sigma, and x -> (K - sigma M)^-1 x; None where no factor can be trusted."""
     signed = signed_pardiso if solver == "pardiso" else signed_superlu
     return signed(combined(K, -sigma, M))
 
 
-def _shifts(found: Modes, keep: int, limit: float) -> Iterator[float]:
-    """Places in the widest gap above the modes wanted, relative to its upper end."""
-    value = found.eigenvalue
-    low = np.maximum(np.concatenate([[0.0], value])[keep:-1], limit)
-    high = value[keep:]
-    width = (high - low) / np.maximum(high, np.finfo(np.float64).tiny)
-    # Rounding of the eigenvalues themselves must be no matter.
-    if not width.size or width.max() < np.sqrt(np.finfo(np.float64).eps):
-        return
-    j = int(np.argmax(width))
-    for place in _PLACES:
-        yield float(low[j] + place * (high[j] - low[j]))
-
-
-def _stands_clear(M: Matrix, found: Modes, sigma: float, factor: SignedFactor) -> bool:
+def _stands_clear(M: Matrix, found: Modes, sigma: float, solve: Solve) -> bool:
     """Whether the factor puts the neighbours found where they are, and nothing on the shift.
 
     For a mode x, x'M (K - sigma M)^-1 M x is 1 / (lambda - sigma). Inverse iteration from random
@@ -131,13 +127,13 @@ def _stands_clear(M: Matrix, found: Modes, sigma: float, factor: SignedFactor) -
     next_one = int(np.searchsorted(value, sigma))
     near = slice(max(0, next_one - _NEIGHBOURS), next_one + _NEIGHBOURS)
     X, distance = found.shapes[:, near], value[near] - sigma
-    seen = np.einsum("ij,ij->j", M @ X, factor.solve(M @ X))
+    seen = np.einsum("ij,ij->j", M @ X, solve(M @ X))
     if not (np.abs(seen * distance - 1.0) <= _DISPLACED).all():
         return False
     v: FloatArray = np.random.default_rng(0).standard_normal((M.shape[0], _PROBES))
     size = _norm(M, v)
     for _ in range(_STEPS):
-        v = factor.solve(M @ (v / size))
+        v = solve(M @ (v / size))
         size = _norm(M, v)
     return bool((size * np.abs(distance).min() <= 1.0 / _ON_THE_SHIFT).all())
 

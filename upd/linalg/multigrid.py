@@ -19,7 +19,6 @@ References
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -30,7 +29,7 @@ from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import MAX_ITERATIONS, FloatArray, checked_vectors, log
-from upd.linalg.conjugate import UNSEEN, LowestRitz, conjugate_gradients
+from upd.linalg.conjugate import UNSEEN, conjugate_gradients
 from upd.linalg.nodes import STRONG, aggregates, near_neighbours, padded, places, positions
 from upd.linalg.parallel import in_parallel
 from upd.linalg.schur import Solved
@@ -47,20 +46,9 @@ MOST_LEVELS = 10
 TWICE = 2
 
 
-@dataclass(frozen=True)
-class AggregationLevel:
-    """One level of the hierarchy.
-
-    Attributes
-    ----------
-    smoother : Smoother
-    P, R : sparse array
-        Prolongation from the next level, in the smoother's order, and its transpose.
-    """
-
-    smoother: Smoother
-    P: Any
-    R: Any
+#: one level: its smoother, the prolongation P from the next level, in the smoother's order, and its
+#: transpose, sparse
+Level = tuple[Smoother, Any, Any]
 
 
 class Hierarchy:
@@ -71,7 +59,7 @@ class Hierarchy:
     """
 
     def __init__(
-        self, levels: list[AggregationLevel], coarsest: FloatArray, real: NDArray[np.bool_], n: int
+        self, levels: list[Level], coarsest: FloatArray, real: NDArray[np.bool_], n: int
     ) -> None:
         """Dofs of the coarsest level that are not ``real`` stand for nothing: an aggregate of a few
         dofs does not tell all six modes apart.
@@ -84,7 +72,7 @@ class Hierarchy:
                 f"Multigrid: the coarsest level failed ({error}): the body floats, hold "
                 "the distant set."
             ) from error
-        self.sizes = [*(level.P.shape[0] for level in levels), len(coarsest)]
+        self.sizes = [*(P.shape[0] for _, P, _ in levels), len(coarsest)]
 
     def __call__(self, residual: FloatArray) -> FloatArray:
         """M r, with r scaled to one first: single precision has few powers of ten."""
@@ -97,13 +85,13 @@ class Hierarchy:
             x = np.zeros_like(b)
             x[self._real] = cho_solve(self._coarsest, b[self._real].astype(np.float64))
             return x
-        level = self._levels[depth]
-        order = level.smoother.order
+        smoother = self._levels[depth][0]
+        order = smoother.order
         if order is not None:
             b = b[order]
         x = self._visit(depth, b)
         if depth >= TWICE:
-            x += self._visit(depth, level.smoother.residual(b, x))
+            x += self._visit(depth, smoother.residual(b, x))
         if order is None:
             return x
         out = np.empty_like(x)
@@ -112,10 +100,10 @@ class Hierarchy:
 
     def _visit(self, depth: int, b: Single) -> Single:
         """One cycle from zero, in the order of the level's smoother."""
-        level = self._levels[depth]
-        x, residual = level.smoother.first(b)
-        x += level.P @ self.cycle(depth + 1, np.ascontiguousarray(level.R @ residual))
-        level.smoother.last(b, x)
+        smoother, P, R = self._levels[depth]
+        x, residual = smoother.first(b)
+        x += P @ self.cycle(depth + 1, np.ascontiguousarray(R @ residual))
+        smoother.last(b, x)
         return x
 
 
@@ -181,7 +169,7 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
             P = one.P.astype(np.float32)
         else:
             P = in_order(bsr_array(one.P), smoother.order[::3] // 3)
-        levels.append(AggregationLevel(smoother, P, P.T.tocsr() if P.format == "csr" else P.T))
+        levels.append((smoother, P, P.T.tocsr() if P.format == "csr" else P.T))
         one.A = one.P = one.R = None
     return Hierarchy(levels, last.A.toarray(), np.any(last.B != 0.0, axis=1), A.shape[0])
 
@@ -243,28 +231,19 @@ class MultigridSolver:
         return self.cycle(whole)[self._place]
 
     def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
-        """K^-1 rhs for the columns of (n, m), side by side; raises as for one."""
-
-        def run(b: FloatArray) -> tuple[Solved, LowestRitz]:
-            return conjugate_gradients(
-                lambda x: np.asarray(self._K @ x),
-                self.precondition,
-                b,
-                accuracy=accuracy,
-                max_iterations=self._max_iterations,
-                lowest=known,
-            )
-
-        # of all columns the same, so that none depends on which ends first
-        known = self._lowest
-        jobs = [partial(run, np.ascontiguousarray(b)) for b in rhs.T]
-        made = in_parallel(jobs, threads_used())
-        self._lowest = min([known, *(lowest for _, lowest in made)])
-        return [solved for solved, _ in made]
-
-    def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
-        """K^-1 rhs to a relative error in energy.
+        """K^-1 rhs to a relative error in energy for the columns of (n, m), side by side.
 
         Raises ConvergenceError where it is not reached.
         """
-        return self.many(rhs[:, None], accuracy)[0]
+        run = partial(
+            conjugate_gradients,
+            lambda x: np.asarray(self._K @ x),
+            self.precondition,
+            accuracy=accuracy,
+            max_iterations=self._max_iterations,
+            # of all columns the same, so that none depends on which ends first
+            lowest=self._lowest,
+        )
+        made = in_parallel([partial(run, np.ascontiguousarray(b)) for b in rhs.T], threads_used())
+        self._lowest = min([self._lowest, *(lowest for _, lowest in made)])
+        return [solved for solved, _ in made]

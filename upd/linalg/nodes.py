@@ -73,7 +73,13 @@ def padded(
     if modes is not None:
         B = np.zeros((n_padded, modes.shape[1]))
         B[place] = modes
-    if not (n_padded % 3 == 0 and (whole_blocks or whole_nodes(n, modes))):
+        if not whole_blocks and n % 3 == 0 and modes.shape[1] >= 3:
+            # Three dofs per node in order, if each dof moves in the translation of its own
+            # component only.
+            T = modes[:, :3].reshape(-1, 3, 3)
+            off = T[:, ~np.eye(3, dtype=bool)]
+            whole_blocks = bool((np.abs(off) <= np.sqrt(EPS) * np.abs(T).max()).all())
+    if not (n_padded % 3 == 0 and whole_blocks):
         return csr_matrix(whole(K)).tobsr(blocksize=(1, 1)), B
     A = csr_array(whole(K))
     order = np.argsort(place, kind="stable")
@@ -92,28 +98,6 @@ def padded(
     on = np.flatnonzero(blocks.indices == nodes)
     blocks.data[on[missing // 3], missing % 3, missing % 3] = float(np.median(K.diagonal()))
     return blocks, B
-
-
-def whole_nodes(n: int, B: FloatArray | None) -> bool:
-    """Whether the first three modes show three dofs per node in order: each dof then moves in the
-    translation of its own component only.
-
-    Parameters
-    ----------
-    n : int
-        Dofs.
-    B : (n, m) ndarray or None
-        Modes.
-
-    Returns
-    -------
-    bool
-    """
-    if n % 3 or B is None or B.shape[1] < 3:
-        return False
-    T = B[:, :3].reshape(-1, 3, 3)
-    off = T[:, ~np.eye(3, dtype=bool)]
-    return bool((np.abs(off) <= np.sqrt(EPS) * np.abs(T).max()).all())
 
 
 def positions(points: ArrayLike, n: int, layout: ArrayLike | None) -> FloatArray:

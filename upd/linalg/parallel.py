@@ -20,10 +20,8 @@ Found = TypeVar("Found")
 SMALL = 1000
 
 
-@cache
-def _controller() -> ThreadpoolController:
-    """Finding the libraries takes a millisecond: once."""
-    return ThreadpoolController()
+#: finding the libraries takes a millisecond: once
+_controller = cache(ThreadpoolController)
 
 
 def threads_for(order: int, small: int = SMALL) -> AbstractContextManager[object]:

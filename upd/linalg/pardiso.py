@@ -12,7 +12,7 @@ chance; mostly they are zeros of fresh memory, hence a crash now and then. Seen 
 1 500 random matrices of 2 to 60 dofs all 611 with a diagonal K_ii crashed in the analysis, none of
 the 889 others. Arrays of exact length between inaccessible pages are read and written inside their
 bounds only, whatever the dummy right-hand side of the factorisation. So PARDISO never gets a
-diagonal K_ii, whose Schur complement needs no factor (`uncoupled`).
+diagonal K_ii (`uncoupled`): SuperLU does, whose factor of it is itself.
 
 References
 ----------
@@ -36,28 +36,21 @@ from scipy.sparse import csr_array, diags_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import (
-    Condensation,
+    Condensed,
     Factor,
     FloatArray,
     IntArray,
-    SignedFactor,
     Solve,
     checked_dofs,
     checked_vectors,
     inner_free_error,
+    is_free,
     log,
     row_blocks,
     softest_motion,
 )
-from upd.linalg.symmetric import (
-    Matrix,
-    Symmetric,
-    checked,
-    stored,
-    upper_triangle,
-    whole,
-    with_diagonal,
-)
+from upd.linalg.superlu import schur_superlu
+from upd.linalg.symmetric import Matrix, Symmetric, checked, stored, upper_triangle
 
 SPD, SYMMETRIC, HERMITIAN = 2, -2, 4
 ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
@@ -104,10 +97,6 @@ def load() -> Callable[..., None]:
     return call  # type: ignore[no-any-return]
 
 
-def _pointer(array: FloatArray | IntArray) -> ctypes.c_void_p:
-    return array.ctypes.data_as(ctypes.c_void_p)
-
-
 def _call(
     handle: IntArray,
     phase: int,
@@ -129,7 +118,7 @@ def _call(
     count = np.array([x.shape[1] if many else 1], np.int64)
     quiet = np.zeros(1, np.int64)
     arrays = [handle, *numbers, *matrix, perm, count, iparm, quiet, rhs, x, error]
-    load()(*map(_pointer, arrays))
+    load()(*(one.ctypes.data_as(ctypes.c_void_p) for one in arrays))
     return int(error[0])
 
 
@@ -153,7 +142,16 @@ class _Pardiso:
     ) -> None:
         self.n, self.kind = A.shape[0], kind
         self.handle = np.zeros(64, np.int64)
-        self.matrix = _input(A)
+        # Values, row pointers and columns, from 1, of the upper triangle: two thirds of K; of a
+        # `Symmetric` the values are its own.
+        if isinstance(A, Symmetric):
+            U = A.upper
+            data, indptr, columns = U.data, U.indptr.astype(np.int64), U.indices.astype(np.int64)
+        else:
+            data, indptr, columns = upper_triangle(A)
+        columns += 1
+        indptr += 1
+        self.matrix = data, indptr, columns
         self.perm = np.zeros(self.n, np.int64)
         self.iparm = np.zeros(64, np.int64)
         # Own values; parallel nested dissection; report factor non-zeros. Everything else 0:
@@ -168,18 +166,15 @@ class _Pardiso:
         if kind == SYMMETRIC:
             # Pivots below 1e-13 of the norm are perturbed (and counted); 1x1 and 2x2 pivots.
             self.iparm[[9, 20]] = 13, 1
-        # Before the first call, so that a failed phase is released as well. At exit the process
-        # frees more quickly than MKL.
-        self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm, kind)
-        self._release.atexit = False
-
-    def close(self) -> None:
-        """Give the memory back now."""
-        self._release()
+        # Gives the memory back, when called or when nobody holds this any more. Before the first
+        # call, so that a failed phase is released as well. At exit the process frees more quickly
+        # than MKL.
+        self.close = weakref.finalize(self, _release, self.handle, self.n, self.iparm, kind)
+        self.close.atexit = False
 
     def run(self, phase: int, rhs: FloatArray | None = None, x: FloatArray | None = None) -> int:
         """One phase. Returns 0 or NOT_POSITIVE; raises ConvergenceError for any other error."""
-        if not self._release.alive:
+        if not self.close.alive:
             raise ConvergenceError("PARDISO: the factor was already released: factorise again.")
         none = np.zeros(2)  # the size of one complex number too
         rhs, x = none if rhs is None else rhs, none if x is None else x
@@ -193,41 +188,18 @@ class _Pardiso:
             )
         return code
 
-    def substitute(self, phase: int, rhs: FloatArray) -> FloatArray:
-        """Solve phases for right-hand sides (n,) or (n, m)."""
+    def solve(self, rhs: FloatArray, phase: int = SOLVE) -> FloatArray:
+        """K^-1 rhs, or another solve phase, for right-hand sides (n,) or (n, m)."""
         b = np.asfortranarray(rhs, dtype=self.matrix[0].dtype)
         x = np.zeros_like(b, order="F")
         if b.size:
             self.run(phase, b, x)
         return x
 
-    def solve(self, rhs: FloatArray) -> FloatArray:
-        """K^-1 rhs."""
-        return self.substitute(SOLVE, rhs)
-
-    @property
-    def factor_nnz(self) -> int:
-        return int(self.iparm[17])
-
-    @property
-    def peak_bytes(self) -> int:
-        """Manual: max(iparm[14], iparm[15] + iparm[16]) KiB."""
-        return _KIB * int(max(self.iparm[14], self.iparm[15] + self.iparm[16]))
-
-
-def _input(A: Matrix) -> tuple[FloatArray, IntArray, IntArray]:
-    """Values, row pointers and columns, from 1, of the upper triangle.
-
-    Two thirds of K; of a `Symmetric` the values are its own.
-    """
-    if isinstance(A, Symmetric):
-        U = A.upper
-        data, indptr, columns = U.data, U.indptr.astype(np.int64), U.indices.astype(np.int64)
-    else:
-        data, indptr, columns = upper_triangle(A)
-    columns += 1
-    indptr += 1
-    return data, indptr, columns
+    def size(self) -> tuple[int, int]:
+        """Non-zeros of the factor, and the peak of memory in bytes as in the manual."""
+        peak = int(max(self.iparm[14], self.iparm[15] + self.iparm[16]))
+        return int(self.iparm[17]), _KIB * peak
 
 
 def factorise_pardiso(K: Any) -> Factor:
@@ -254,13 +226,13 @@ def factorise_pardiso(K: Any) -> Factor:
     solver.run(ANALYSE)
     code = solver.run(FACTORISE)
     motion = None if code else softest_motion(A, solver.solve)
-    if motion is None or motion.is_free:
+    if motion is None or is_free(*motion):
         raise inner_free_error(motion, np.arange(A.shape[0]), "PARDISO")
 
     def solve(rhs: FloatArray) -> FloatArray:
         return np.ascontiguousarray(solver.solve(checked_vectors(rhs, solver.n, "right-hand side")))
 
-    return Factor(solve, "pardiso", solver.factor_nnz, solver.peak_bytes)
+    return Factor(solve, "pardiso", *solver.size())
 
 
 def hermitian_pardiso(upper: csr_array) -> Solve:
@@ -283,7 +255,7 @@ def hermitian_pardiso(upper: csr_array) -> Solve:
     return solver.solve
 
 
-def signed_pardiso(A: Matrix) -> SignedFactor | None:
+def signed_pardiso(A: Matrix) -> tuple[int, Solve] | None:
     """L D L' of a symmetric matrix with 1x1 and 2x2 pivots, and how many eigenvalues are negative.
 
     Parameters
@@ -293,8 +265,9 @@ def signed_pardiso(A: Matrix) -> SignedFactor | None:
 
     Returns
     -------
-    SignedFactor or None
-        None when a pivot was perturbed: its sign is then not the matrix's own.
+    (int, callable) or None
+        Negative eigenvalues (Sylvester's law of inertia), and right-hand sides -> A^-1 rhs. None
+        when a pivot was perturbed: its sign is then not the matrix's own.
 
     Raises
     ------
@@ -309,10 +282,10 @@ def signed_pardiso(A: Matrix) -> SignedFactor | None:
     positive, negative, perturbed = (int(solver.iparm[i]) for i in (21, 22, 13))
     if perturbed or positive + negative != solver.n:
         return None
-    return SignedFactor(negative, solver.solve)
+    return negative, solver.solve
 
 
-def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
+def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensed:
     """Schur complement of a matrix on some dofs, and its recovery, from one factorisation.
 
     S may be singular (a body that only the kept dofs hold): K_ii must be positive definite.
@@ -329,7 +302,7 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
 
     Returns
     -------
-    Condensation
+    Condensed
 
     Raises
     ------
@@ -340,11 +313,10 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
     """
     A = checked(K)
     kept = checked_dofs(kept, A.shape[0])
-    direct = uncoupled(A, kept)
-    if direct is not None:
-        return direct
+    if uncoupled(A, kept):
+        return schur_superlu(A, kept, keep_factor=keep_factor)
     solver, S = _schur(A, kept)
-    nnz, peak = solver.factor_nnz, solver.peak_bytes
+    nnz, peak = solver.size()
     held: list[_Pardiso] = [solver]
     if not keep_factor:
         held.pop().close()
@@ -355,7 +327,7 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
             held.append(_schur(A, kept)[0])
         y = np.zeros((A.shape[0], *u.shape[1:]))
         y[kept] = u
-        return np.ascontiguousarray(held[0].substitute(BACKWARD, y))
+        return np.ascontiguousarray(held[0].solve(y, BACKWARD))
 
     log.info(
         "pardiso: %d dofs onto %d, %d factor non-zeros, %.2f GB",
@@ -364,7 +336,7 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
         nnz,
         peak / 1e9,
     )
-    return Condensation(S, recover, "pardiso", nnz, peak)
+    return Condensed(S, recover, "pardiso", nnz, peak, A.shape[0])
 
 
 def _schur(A: Matrix, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
@@ -376,45 +348,34 @@ def _schur(A: Matrix, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
     """
     motion = None
     for spring in (0.0, float(A.diagonal()[kept].max())):
-        held = np.zeros(A.shape[0])
-        held[kept] = spring
-        B = A if spring == 0.0 else with_diagonal(A, held)
+        B = A
+        if spring:
+            held = np.zeros(A.shape[0])
+            held[kept] = spring
+            D = csr_array(diags_array(held))
+            B = Symmetric(A.upper + D) if isinstance(A, Symmetric) else csr_array(A + D)
         solver = _Pardiso(B, kept)
         solver.run(ANALYSE)
         S = np.zeros((len(kept), len(kept)))
         code = solver.run(FACTORISE, None, S)
         motion = None if code else softest_motion(B, solver.solve)
-        if motion is not None and not motion.is_free:
-            return solver, _ordered(S, kept) - spring * np.eye(len(kept))
+        if motion is not None and not is_free(*motion):
+            # S comes back for increasing dofs; some versions fill one triangle only.
+            S = np.where(S == 0.0, S.T, S)
+            place = np.argsort(np.argsort(kept))
+            return solver, S[np.ix_(place, place)] - spring * np.eye(len(kept))
         solver.close()
     raise inner_free_error(motion, np.arange(A.shape[0]), "PARDISO")
 
 
-def _ordered(S: FloatArray, kept: IntArray) -> FloatArray:
-    """S comes back for increasing dofs; some versions fill one triangle only."""
-    S = np.where(S == 0.0, S.T, S)
-    if (np.diff(kept) > 0).all():
-        return S
-    place = np.argsort(np.argsort(kept))
-    return S[np.ix_(place, place)]
-
-
-def uncoupled(K: Matrix, kept: IntArray) -> Condensation | None:
-    """Condensation of a matrix whose inner dofs touch kept dofs only, if it is one.
-
-    K_ii is then diagonal, D, and S = K_bb - K_bi D^-1 K_ib needs no factor; without any inner dof S
-    is K_bb.
+def uncoupled(K: Matrix, kept: IntArray) -> bool:
+    """Whether inner dofs touch kept dofs only: K_ii is then diagonal.
 
     Parameters
     ----------
     K : (n, n) Symmetric or csr_array
         As `upd.linalg.symmetric.checked` gives it.
     kept : (k,) array of int
-
-    Returns
-    -------
-    Condensation or None
-        None when two inner dofs are coupled.
     """
     A = stored(K)
     n = A.shape[0]
@@ -425,17 +386,5 @@ def uncoupled(K: Matrix, kept: IntArray) -> Condensation | None:
         row = np.repeat(np.arange(first, last), np.diff(A.indptr[first : last + 1]))
         column = A.indices[part]
         if (is_inner[row] & is_inner[column] & (row != column) & (A.data[part] != 0.0)).any():
-            return None
-    A = whole(K)
-    inner = np.flatnonzero(is_inner)
-    K_ib, D = csr_array(A[inner][:, kept]), A.diagonal()[inner]
-    S = A[kept][:, kept].toarray() - (K_ib.T @ diags_array(1.0 / D) @ K_ib).toarray()
-
-    def recover(u_kept: FloatArray) -> FloatArray:
-        u_b = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
-        u = np.zeros((n, *u_b.shape[1:]))
-        u[kept] = u_b
-        u[inner] = -((K_ib @ u_b).T / D).T
-        return u
-
-    return Condensation(0.5 * (S + S.T), recover, "none", 0, S.nbytes)
+            return False
+    return True

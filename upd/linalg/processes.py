@@ -16,7 +16,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from importlib import import_module
 from typing import IO, Any
 
@@ -33,7 +33,7 @@ MOST_BESIDE = 3
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
-class SideProcesses:
+class SideProcesses(AbstractContextManager["SideProcesses"]):
     """Processes that wait for jobs; left, they end.
 
     Parameters
@@ -47,9 +47,6 @@ class SideProcesses:
     def __init__(self, *modules: str, count: int | None = None) -> None:
         wanted = threads_used() - 1 if count is None else count
         self._beside = [_start(modules) for _ in range(max(0, min(MOST_BESIDE, wanted)))]
-
-    def __enter__(self) -> SideProcesses:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._kill()

@@ -13,23 +13,17 @@ error than |B' e|_{C^-1} <= |e|_K, whatever B is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.common import (
-    Condensation,
-    Factor,
-    FloatArray,
-    checked_dofs,
-    log,
-)
-from upd.linalg.pardiso import factorise_pardiso, schur_pardiso, uncoupled
+from upd.linalg.common import Condensed, Factor, FloatArray, log
+from upd.linalg.pardiso import factorise_pardiso, schur_pardiso
 from upd.linalg.select import choose
 from upd.linalg.superlu import factorise_superlu, schur_superlu
-from upd.linalg.symmetric import Matrix, checked
+from upd.linalg.symmetric import Matrix
 
 
 def _direct(n_dof: int, n_kept: int, solver: str) -> str:
@@ -41,7 +35,7 @@ def _direct(n_dof: int, n_kept: int, solver: str) -> str:
 
 def schur_complement(
     K: Any, kept: ArrayLike, *, solver: str = "auto", keep_factor: bool = True
-) -> Condensation:
+) -> Condensed:
     """Schur complement of a symmetric matrix on some dofs, and the recovery of the others.
 
     Parameters
@@ -56,7 +50,7 @@ def schur_complement(
 
     Returns
     -------
-    Condensation
+    Condensed
 
     Raises
     ------
@@ -66,12 +60,9 @@ def schur_complement(
         When a part of the body floats.
     """
     n = int(K.shape[0]) if hasattr(K, "shape") else 0
-    if np.size(kept) == n and n > 0:
-        A = checked(K)
-        found = uncoupled(A, checked_dofs(kept, n))
-        assert found is not None
-        return found
-    name = _direct(n, int(np.size(kept)), solver)
+    # with every dof kept there is nothing to factorise
+    everything = np.size(kept) == n and n > 0
+    name = "superlu" if everything else _direct(n, int(np.size(kept)), solver)
     run = schur_pardiso if name == "pardiso" else schur_superlu
     return run(K, kept, keep_factor=keep_factor)
 
@@ -132,28 +123,6 @@ class Solved:
     iterations: int
 
 
-class Solver(Protocol):
-    """A stiffness ready for right-hand sides.
-
-    Attributes
-    ----------
-    name : str
-    """
-
-    name: str
-
-    def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
-        """K^-1 rhs to a relative error in energy.
-
-        Raises ConvergenceError where it is not reached.
-        """
-        ...
-
-    def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
-        """The same for the columns of (n, m)."""
-        ...
-
-
 class DirectSolver:
     """A kept factor of K. Each answer is refined once, which bounds its error.
 
@@ -176,12 +145,10 @@ class DirectSolver:
         self._factor = factorise(K, solver=name)
         self.name = self._factor.solver
 
-    def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
-        """K^-1 rhs; raises ConvergenceError where the relative error in energy is larger."""
-        return self.many(rhs[:, None], accuracy)[0]
-
     def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
-        """The same for the columns of (n, m)."""
+        """K^-1 rhs for the columns of (n, m); raises ConvergenceError where the relative error in
+        energy is larger.
+        """
         x = self._factor(rhs)
         residual = rhs - self._K @ x
         more = self._factor(residual)

@@ -56,36 +56,17 @@ _SOLUTIONS = 2
 _FIELD = 8.0
 
 
-@dataclass(frozen=True)
-class Rates:
-    """Speeds of one thread, and what all threads together gain.
-
-    Attributes
-    ----------
-    factor_flops
-        Operations per s of a sparse Cholesky factorisation.
-    analysis_entries
-        Entries of a matrix ordered and analysed per s.
-    solve_bytes
-        Bytes of a factor read per s by a triangular solve.
-    dense_flops
-        Operations per s of dense Cholesky, LU and products.
-    elements
-        Hexahedra with eight nodes per s whose stiffness is assembled: numpy on large arrays.
-    speedup
-        All threads over one thread, of a sparse factorisation.
-    """
-
-    factor_flops: float = 3.0e10
-    analysis_entries: float = 9.0e6
-    solve_bytes: float = 1.0e10
-    dense_flops: float = 2.6e10
-    elements: float = 6.0e4
-    speedup: float = 1.5
-
-
-#: one core of a server of 2.1 GHz, where the seconds in plans were measured
-USUAL = Rates()
+# Speeds of one core of a server of 2.1 GHz, where the seconds in plans were measured.
+#: operations per s of a sparse Cholesky factorisation, and of dense Cholesky, LU and products
+FACTOR_FLOPS, DENSE_FLOPS = 3.0e10, 2.6e10
+#: entries of a matrix ordered and analysed per s
+ANALYSIS_ENTRIES = 9.0e6
+#: bytes of a factor read per s by a triangular solve
+SOLVE_BYTES = 1.0e10
+#: hexahedra with eight nodes per s whose stiffness is assembled: numpy on large arrays
+ELEMENTS = 6.0e4
+#: all threads over one thread, of a sparse factorisation
+SPEEDUP = 1.5
 
 
 @dataclass(frozen=True)
@@ -144,15 +125,25 @@ class Prediction:
 
     def substitution(self) -> float:
         """Seconds of one right-hand side, forward and backward."""
-        return 16.0 * self.factor_nnz / USUAL.solve_bytes
+        return 16.0 * self.factor_nnz / SOLVE_BYTES
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A solver's name and why it was taken."""
+    """One way to an answer.
+
+    Attributes
+    ----------
+    name : str
+        A solver, or "products by " and a solver.
+    why : str
+        Why it was taken, or for how many products.
+    cost : Prediction
+    """
 
     name: str
     why: str
+    cost: Prediction
 
 
 def threads() -> int:
@@ -196,7 +187,7 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
     InputError
         For an unknown solver.
     """
-    n, k, r = float(n_dof), float(n_kept), USUAL
+    n, k = float(n_dof), float(n_kept)
     body = Solid() if solid is None else solid
     if solver == "pardiso":
         quadratic = body.nodes == 20
@@ -212,13 +203,13 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
             + _FLOPS_KEPT * k * n ** (4 / 3)
             + k**3 / 3
         )
-        entries, factor = body.entries * n, flops / r.factor_flops
+        entries, factor = body.entries * n, flops / FACTOR_FLOPS
         return Prediction(
             _BYTES_NNZ * nnz + _BYTES_ENTRY * entries + _BYTES_DOF * n + DENSE * k**2,
-            entries * (_ANALYSIS / r.analysis_entries + _CHECKS)
+            entries * (_ANALYSIS / ANALYSIS_ENTRIES + _CHECKS)
             + factor
-            + _SOLVES * 16.0 * nnz / r.solve_bytes
-            + k**3 / r.dense_flops,
+            + _SOLVES * 16.0 * nnz / SOLVE_BYTES
+            + k**3 / DENSE_FLOPS,
             factor,
             nnz,
         )
@@ -276,7 +267,7 @@ def choose(
         For an unknown name or one that is not installed.
     """
     if solver != "auto":
-        predict(n_dof, n_kept, solver)
+        cost = predict(n_dof, n_kept, solver, solid)
         if solver == "pardiso" and not has_pardiso():
             raise InputError(
                 'Solver "pardiso" is not installed: pip install updampers[mkl], or choose '
@@ -287,7 +278,7 @@ def choose(
                 'Solver "amg" has no factor and gives compliances only: choose "pardiso" '
                 'or "superlu" here.'
             )
-        return Choice(solver, "named by the user")
+        return Choice(solver, "named by the user", cost)
     limit = memory_limit_bytes if memory_limit_bytes is not None else memory_left()
     names = [
         name
@@ -302,6 +293,7 @@ def choose(
             name,
             f"needs the least memory, {_size(costs[name].bytes)}, though more than the "
             f"{_size(limit)} it may use",
+            costs[name],
         )
     # the only one that serves several bodies side by side, and beyond small ones the fastest
     name = "pardiso" if "pardiso" in fitting else min(fitting, key=lambda name: costs[name].seconds)
@@ -309,57 +301,11 @@ def choose(
     why = f"it fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of {_size(limit)}"
     if not has_pardiso():
         why += "; pip install updampers[mkl] for a faster one"
-    return Choice(name, why)
+    return Choice(name, why, cost)
 
 
 def _size(count: float) -> str:
     return f"{count / 1e9:.2g} GB"
-
-
-@dataclass(frozen=True)
-class Route:
-    """One way and its predicted cost.
-
-    Attributes
-    ----------
-    name : str
-        A solver that condenses, or "products by " and a solver.
-    cost : Prediction
-    why : str
-        Why this solver, or for how many products.
-    """
-
-    name: str
-    cost: Prediction
-    why: str
-
-
-def predict_products(
-    n_dof: int, solver: str, products: int, solid: Solid | None = None
-) -> Prediction:
-    """Memory and time of so many products with the compliance of a body.
-
-    Parameters
-    ----------
-    n_dof : int
-    solver : {"pardiso", "superlu", "amg"}
-    products : int
-    solid : Solid, optional
-
-    Returns
-    -------
-    Prediction
-    """
-    fields = _FIELD * n_dof * products
-    if solver == "amg":
-        columns = predict(n_dof, products, solver, solid)
-        return replace(columns, bytes=columns.bytes + fields)
-    factor = predict(n_dof, 0, solver, solid)
-    return replace(
-        factor,
-        bytes=factor.bytes + fields,
-        seconds=factor.seconds + _SOLUTIONS * products * factor.substitution(),
-    )
 
 
 def contact_routes(
@@ -370,7 +316,7 @@ def contact_routes(
     solver: str = "auto",
     memory_limit_bytes: float | None = None,
     solid: Solid | None = None,
-) -> list[Route]:
+) -> list[Choice]:
     """The ways open to a solver's name, the condensing one first.
 
     Parameters
@@ -383,31 +329,34 @@ def contact_routes(
 
     Returns
     -------
-    list of Route
+    list of Choice
     """
-    taken = choose(n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid)
-    dense = taken.name
-    cost = predict(n_dof, n_kept, dense, solid)
-    found = [Route(dense, cost, taken.why)]
+    found = [
+        choose(n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid)
+    ]
     direct = "pardiso" if has_pardiso() else "superlu"
     for name in (direct, "amg") if solver == "auto" else (solver,):
-        cost = predict_products(n_dof, name, products, solid)
-        found.append(Route(PRODUCTS + name, cost, f"{products} products"))
+        # multigrid solves for each product, a factor is made once
+        cost = predict(n_dof, products if name == "amg" else 0, name, solid)
+        more = _SOLUTIONS * products * cost.substitution()
+        fields = _FIELD * n_dof * products
+        cost = replace(cost, bytes=cost.bytes + fields, seconds=cost.seconds + more)
+        found.append(Choice(PRODUCTS + name, f"{products} products", cost))
     return found
 
 
 def choose_route(
-    ways: Sequence[Route],
+    ways: Sequence[Choice],
     products: int,
     *,
     route: str = "auto",
     memory_limit_bytes: float | None = None,
-) -> tuple[Choice, Prediction]:
-    """The way to take, and its cost.
+) -> Choice:
+    """The way to take.
 
     Parameters
     ----------
-    ways : sequence of Route
+    ways : sequence of Choice
         From `contact_routes`.
     products : int
         What they were predicted for.
@@ -417,8 +366,7 @@ def choose_route(
 
     Returns
     -------
-    Choice, Prediction
-        The name is that of a `Route`.
+    Choice
 
     Raises
     ------
@@ -432,17 +380,17 @@ def choose_route(
     fit = [one for one in others if one.cost.bytes <= limit]
     best = min(fit, key=lambda one: one.cost.seconds, default=None)
     if route == "condensed":
-        return Choice(dense.name, dense.why), dense.cost
+        return dense
     if route == "auto":
         affordable = dense.cost.bytes <= limit
         if affordable and (best is None or dense.cost.seconds <= WORTH * best.cost.seconds):
-            return Choice(dense.name, dense.why), dense.cost
+            return dense
     taken = best if best is not None else min(others, key=lambda one: one.cost.bytes)
     why = (
         f"about {taken.cost.seconds:.2g} s and {taken.cost.bytes / 1e9:.2g} GB for {products} "
         f"products, {dense.cost.seconds:.2g} s and {dense.cost.bytes / 1e9:.2g} GB condensed"
     )
-    return Choice(taken.name, why), taken.cost
+    return replace(taken, why=why)
 
 
 def memory_left() -> float:
@@ -464,8 +412,15 @@ def available() -> dict[str, str]:
 
     Each solver's version, the BLAS of numpy and scipy, threads, rounding unit.
     """
+    pardiso = "not installed: pip install updampers[mkl]"
+    if has_pardiso():
+        try:
+            mkl = metadata.version("mkl")
+        except metadata.PackageNotFoundError:
+            mkl = "from the system"
+        pardiso = f"pypardiso {metadata.version('pypardiso')}, MKL {mkl}"
     found = {
-        "solver pardiso": _pardiso_version(),
+        "solver pardiso": pardiso,
         "solver superlu": f"scipy {scipy.__version__}",
         "solver amg": f"pyamg {metadata.version('pyamg')}",
         "BLAS of numpy": _blas(np.show_config(mode="dicts")),
@@ -475,16 +430,6 @@ def available() -> dict[str, str]:
     }
     found["solver chosen"] = "pardiso" if has_pardiso() else "superlu"
     return found
-
-
-def _pardiso_version() -> str:
-    if not has_pardiso():
-        return "not installed: pip install updampers[mkl]"
-    try:
-        mkl = metadata.version("mkl")
-    except metadata.PackageNotFoundError:
-        mkl = "from the system"
-    return f"pypardiso {metadata.version('pypardiso')}, MKL {mkl}"
 
 
 def _blas(config: Mapping[str, Any] | None) -> str:

@@ -187,7 +187,8 @@ def find_lines(A: bsr_array) -> tuple[IntArray, IntArray]:
     starts : (m + 1,) ndarray of int
         Where each line begins there; most nodes of a mesh that is not stretched are lines of one.
     """
-    return _on_lines(A, *_links(A))
+    order, starts = _on_lines(*_links(A), A.indptr, A.indices)
+    return order, starts
 
 
 def find_cross_lines(A: bsr_array, order: IntArray, starts: IntArray) -> tuple[IntArray, IntArray]:
@@ -211,7 +212,7 @@ def find_cross_lines(A: bsr_array, order: IntArray, starts: IntArray) -> tuple[I
     line[order] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     rows, columns = _links(A)
     across = line[rows] != line[columns]
-    order, starts = _on_lines(A, rows[across], columns[across])
+    order, starts = _on_lines(rows[across], columns[across], A.indptr, A.indices)
     lengths = np.diff(starts)
     long = lengths > 1
     return order[np.repeat(long, lengths)], np.concatenate([[0], np.cumsum(lengths[long])])
@@ -230,13 +231,6 @@ def _links(A: bsr_array) -> tuple[Index, Index]:
     links = np.flatnonzero((rows < A.indices) & (shares > STRONG))
     links = links[np.argsort(-shares[links], kind="stable")]
     return rows[links], A.indices[links]
-
-
-def _on_lines(A: bsr_array, rows: Index, columns: Index) -> tuple[IntArray, IntArray]:
-    """All nodes line by line, and where lines begin, from links in their order."""
-    beside = _linked(rows, columns, A.indptr, A.indices)
-    order, starts = _in_order(beside, A.indptr, A.indices)
-    return order, starts
 
 
 @compiled
@@ -280,8 +274,13 @@ def _linked(first: Index, second: Index, indptr: Index, indices: Index) -> Index
 
 
 @compiled
-def _in_order(beside: Index, indptr: Index, indices: Index) -> tuple[Index, Index]:
-    """Nodes line by line, and the starts of lines; a line that comes back beside itself is cut."""
+def _on_lines(
+    first: Index, second: Index, indptr: Index, indices: Index
+) -> tuple[IntArray, IntArray]:
+    """All nodes line by line, and the starts of lines, from links in their order; a line that comes
+    back beside itself is cut.
+    """
+    beside = _linked(first, second, indptr, indices)
     n = len(beside)
     order, starts = np.empty(n, np.int64), np.empty(n + 1, np.int64)
     line = np.full(n, -1, np.int64)

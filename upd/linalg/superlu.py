@@ -16,15 +16,16 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from upd.errors import ConvergenceError
 from upd.linalg.common import (
-    Condensation,
+    Condensed,
     Factor,
     FloatArray,
     IntArray,
-    SignedFactor,
+    Solve,
     checked_dofs,
     checked_matrix,
     checked_vectors,
     inner_free_error,
+    is_free,
     log,
     softest_motion,
 )
@@ -54,7 +55,7 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
     # Without row exchanges the pivots of a positive definite matrix are positive.
     exchanged = not np.array_equal(lu.perm_r, lu.perm_c)
     motion = softest_motion(A, lu.solve)
-    if exchanged or not (lu.U.diagonal() > 0.0).all() or motion.is_free:
+    if exchanged or not (lu.U.diagonal() > 0.0).all() or is_free(*motion):
         raise inner_free_error(motion, numbers, "SuperLU")
     return lu
 
@@ -86,7 +87,7 @@ def symmetric_lu(A: csr_array) -> SuperLU:
         )
 
 
-def signed_superlu(A: Matrix) -> SignedFactor | None:
+def signed_superlu(A: Matrix) -> tuple[int, Solve] | None:
     """L D L' of a symmetric matrix without pivoting; the signs of D are those of U's diagonal.
 
     Nothing bounds the growth of its entries: whoever uses it looks whether it solves.
@@ -97,8 +98,9 @@ def signed_superlu(A: Matrix) -> SignedFactor | None:
 
     Returns
     -------
-    SignedFactor or None
-        None when rows were exchanged, a pivot vanished, or memory ran out.
+    (int, callable) or None
+        Negative eigenvalues (Sylvester's law of inertia), and right-hand sides -> A^-1 rhs. None
+        when rows were exchanged, a pivot vanished, or memory ran out.
     """
     try:
         lu = symmetric_lu(whole(A))
@@ -107,7 +109,7 @@ def signed_superlu(A: Matrix) -> SignedFactor | None:
     D = lu.U.diagonal()
     if not np.array_equal(lu.perm_r, lu.perm_c) or not (np.isfinite(D) & (D != 0.0)).all():
         return None
-    return SignedFactor(int((D < 0.0).sum()), lambda rhs: _solved(lu, rhs))
+    return int((D < 0.0).sum()), lambda rhs: _solved(lu, rhs)
 
 
 def factorise_superlu(K: Any) -> Factor:
@@ -142,7 +144,7 @@ def _solved(lu: SuperLU, rhs: FloatArray) -> FloatArray:
     return np.ascontiguousarray(lu.solve(rhs)) if rhs.size else np.zeros_like(rhs)
 
 
-def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
+def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensed:
     """Schur complement of a matrix on some dofs, by back-substitution of K_ib in blocks of columns.
 
     Parameters
@@ -157,7 +159,7 @@ def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
 
     Returns
     -------
-    Condensation
+    Condensed
 
     Raises
     ------
@@ -195,4 +197,4 @@ def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
 
     peak = _BYTES_PER_NNZ * nnz + 3 * 8 * min(step, len(kept)) * len(inner)
     log.info("superlu: %d dofs onto %d, %d factor non-zeros", n, len(kept), nnz)
-    return Condensation(S, recover, "superlu", nnz, peak)
+    return Condensed(S, recover, "superlu", nnz, peak, n)

@@ -63,11 +63,6 @@ class Symmetric:
         """Rows and columns of some dofs (k,), rising."""
         return Symmetric(submatrix(self.upper, dofs))
 
-    def whole(self) -> csr_array:
-        """Both triangles, (n, n)."""
-        lower = self.upper.T.tocsr()
-        return csr_array(self.upper + lower - diags_array(self.diagonal()))
-
 
 Matrix = csr_array | Symmetric
 
@@ -102,7 +97,10 @@ def whole(K: Any) -> Any:
     -------
     (n, n) sparse array or array_like
     """
-    return K.whole() if isinstance(K, Symmetric) else K
+    if not isinstance(K, Symmetric):
+        return K
+    lower = K.upper.T.tocsr()
+    return csr_array(K.upper + lower - diags_array(K.diagonal()))
 
 
 def submatrix_of(K: Matrix, dofs: IntArray) -> Matrix:
@@ -136,23 +134,6 @@ def combined(K: Matrix, factor: float, M: Matrix) -> Matrix:
     if isinstance(K, Symmetric) and isinstance(M, Symmetric):
         return Symmetric(csr_array(K.upper + factor * M.upper))
     return csr_array(whole(K) + factor * whole(M))
-
-
-def with_diagonal(K: Matrix, more: FloatArray) -> Matrix:
-    """K with something added to its diagonal.
-
-    Parameters
-    ----------
-    K : (n, n) Symmetric or csr_array
-    more : (n,) ndarray
-
-    Returns
-    -------
-    (n, n) Symmetric or csr_array
-    """
-    if isinstance(K, Symmetric):
-        return Symmetric(csr_array(K.upper + diags_array(more)))
-    return csr_array(K + diags_array(more))
 
 
 def stored(K: Matrix) -> csr_array:

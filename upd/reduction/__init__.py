@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from upd.linalg.common import Condensed
 from upd.reduction.component_modes import (
     AttachedModel,
     ErrorTarget,
@@ -9,7 +10,7 @@ from upd.reduction.component_modes import (
     craig_bampton,
     frequency_error,
 )
-from upd.reduction.guyan import Condensed, condense
+from upd.reduction.guyan import condense
 from upd.reduction.mean_held import condense_held_in_mean
 from upd.reduction.reduced import ReducedModel
 

@@ -124,73 +124,56 @@ def craig_bampton(
     S, Psi = static.S, static.recover(np.eye(len(b)))
     # its factor is as large as the one that the modes take
     del static
-    inner = np.setdiff1d(np.arange(n), b)
-    problem = _Inner(A, mass, inner, solver)
-    static_part = _Static(S, A.diagonal()[b], Psi, mass, b, kept)
+    basis = _Basis(A, mass, b, kept, S, Psi, solver)
     if target is None:
-        return static_part.with_modes(*problem.modes(n_modes, below_hz))
-    return _to_target(static_part, problem, _reference(A, mass, target, solver), target)
+        return basis.model(n_modes, below_hz)
+    return _to_target(basis, _reference(A, mass, target, solver), target)
 
 
-class _Inner:
-    """The body with its boundary held: its modes as fields of the whole body.
-
-    The factor is kept between questions.
+class _Basis:
+    """Constraint modes Psi (n, k) with their stiffness S (k, k), and modes with the boundary held,
+    whose factor is kept between questions.
     """
 
-    def __init__(self, A: Matrix, M: Matrix, inner: IntArray, solver: str) -> None:
-        self.n, self.inner = A.shape[0], inner
+    def __init__(
+        self,
+        A: Matrix,
+        M: Matrix,
+        boundary: IntArray,
+        rows: IntArray,
+        S: FloatArray,
+        Psi: FloatArray,
+        solver: str,
+    ) -> None:
+        self.M, self.boundary, self.rows, self.S, self.Psi = M, boundary, rows, S, Psi
+        self.size = A.diagonal()[boundary]
+        self.inner = np.setdiff1d(np.arange(A.shape[0]), boundary)
         self.problem: Eigenproblem | None = None
-        M_ii = submatrix_of(M, inner)
+        self.most = 0
+        M_ii = submatrix_of(M, self.inner)
         # Massless inner dofs have no modes; they follow statically.
-        if inner.size and M_ii.diagonal().any():
-            self.problem = Eigenproblem(submatrix_of(A, inner), M_ii, solver=solver)
-
-    @property
-    def most(self) -> int:
-        return 0 if self.problem is None else self.problem.n_massive
+        if self.inner.size and M_ii.diagonal().any():
+            self.problem = Eigenproblem(submatrix_of(A, self.inner), M_ii, solver=solver)
+            self.most = self.problem.n_massive
 
     def modes(self, count: int | None, below_hz: float | None) -> tuple[FloatArray, FloatArray]:
-        """Frequencies (m,) and shapes (n, m)."""
+        """Frequencies (m,) and shapes (n, m) with the boundary held."""
+        n = self.M.shape[0]
         if self.problem is None or count == 0:
             if count:
                 raise InputError(
                     f"{count} modes are wanted, but no dof with mass remains when the "
                     "boundary is held: ask for 0."
                 )
-            return np.zeros(0), np.zeros((self.n, 0))
+            return np.zeros(0), np.zeros((n, 0))
         found = self.problem.modes(count=count, below_hz=below_hz)
-        shapes = np.zeros((self.n, found.frequency.size))
+        shapes = np.zeros((n, found.frequency.size))
         shapes[self.inner] = found.shapes
         return found.frequency, shapes
 
-
-@dataclass(frozen=True)
-class _Static:
-    """The static half of the basis.
-
-    Attributes
-    ----------
-    S : (k, k) ndarray
-    size : (k,) ndarray
-        Diagonal of K at the boundary.
-    Psi : (n, k) ndarray
-        Constraint modes.
-    M : (n, n) Symmetric or csr_array
-    boundary : (k,) array of int
-    rows : (n_row,) array of int
-        Dofs kept.
-    """
-
-    S: FloatArray
-    size: FloatArray
-    Psi: FloatArray
-    M: Matrix
-    boundary: IntArray
-    rows: IntArray
-
-    def with_modes(self, frequency: FloatArray, Phi: FloatArray) -> ReducedModel:
+    def model(self, count: int | None, below_hz: float | None = None) -> ReducedModel:
         """K = diag(S, Lambda), M = T'MT with T = [Psi Phi]; the block Phi'M Phi is the unit."""
+        frequency, Phi = self.modes(count, below_hz)
         k, m, n = len(self.S), len(frequency), self.M.shape[0]
         K, M = np.zeros((k + m, k + m)), np.eye(k + m)
         value = (2.0 * np.pi * frequency) ** 2
@@ -235,17 +218,15 @@ def _reference(A: Matrix, M: Matrix, target: ErrorTarget, solver: str) -> Modes:
     return found
 
 
-def _to_target(
-    static: _Static, problem: _Inner, reference: Modes, target: ErrorTarget
-) -> ReducedModel:
+def _to_target(basis: _Basis, reference: Modes, target: ErrorTarget) -> ReducedModel:
     """The fewest modes that meet the target.
 
     More of them until it is met, then the least number among these.
     """
-    most = min(target.most, problem.most)
+    most = min(target.most, basis.most)
     count = min(most, 2 * target.of)
     while True:
-        model = static.with_modes(*problem.modes(count, None))
+        model = basis.model(count)
         error = _error(model, reference, target.of)
         if error <= target.error:
             break

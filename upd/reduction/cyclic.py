@@ -203,25 +203,25 @@ class CyclicMatrix(NamedTuple):
 
     Attributes
     ----------
-    same, following : (n, n) csr_array
+    same, following : (n, n) csr_array or ndarray
         Real; `same` is symmetric.
     n_sectors : int
     """
 
-    same: csr_array
-    following: csr_array
+    same: Any
+    following: Any
     n_sectors: int
 
-    def at(self, nodal_diameter: int) -> csr_array:
+    def at(self, nodal_diameter: int) -> Any:
         """(n, n) K_n, real for n = 0 and N/2."""
         phase = phase_of(nodal_diameter, self.n_sectors)
         real = self.same + phase.real * (self.following + self.following.T)
         if phase.imag == 0.0:
-            return csr_array(real)
-        return csr_array(real + 1j * phase.imag * (self.following - self.following.T))
+            return real
+        return real + 1j * phase.imag * (self.following - self.following.T)
 
     def projected(self, V: FloatArray) -> CyclicMatrix:
-        """V'KV for a real basis V (n, r), dense inside."""
+        """V'KV for a real basis V (n, r), dense."""
         return CyclicMatrix(V.T @ (self.same @ V), V.T @ (self.following @ V), self.n_sectors)
 
 
@@ -265,7 +265,7 @@ class CyclicModel(Shown):
 
     def stiffness(self, nodal_diameter: int, speed: float = 0.0) -> csr_array:
         """K_n at a speed in rad/s."""
-        K = self.K.at(nodal_diameter)
+        K: csr_array = self.K.at(nodal_diameter)
         if speed == 0.0:
             return K
         if self.spin is None:
@@ -371,7 +371,11 @@ class ModeFamily(Shown):
             return [X.real, X.imag] if np.iscomplexobj(X) else [X]
 
         basis = in_parallel([partial(blocks, n) for n in nodal_diameters], workers)
-        V = _independent(np.hstack([part for parts in basis for part in parts]))
+        X = np.hstack([part for parts in basis for part in parts])
+        X /= np.maximum(np.linalg.norm(X, axis=0), np.finfo(float).tiny)
+        U, size, _ = np.linalg.svd(X, full_matrices=False)
+        # directions that are rounding are left out
+        V = U[:, size > 1e4 * EPS * size[0]]
         spin = None if model.spin is None else model.spin.projected(V)
         return cls(model.K.projected(V), model.M.projected(V), spin)
 
@@ -383,30 +387,15 @@ class ModeFamily(Shown):
         ConvergenceError
             Beyond the speed of static stability.
         """
-        K = _dense(self.K, nodal_diameter)
+        K, M = self.K.at(nodal_diameter), self.M.at(nodal_diameter)
         if speed != 0.0 and self.spin is not None:
-            K = K + speed**2 * _dense(self.spin, nodal_diameter)
-        M = _dense(self.M, nodal_diameter)
+            K = K + speed**2 * self.spin.at(nodal_diameter)
         with threads_for(len(M)):
             value = eigh(K, M, eigvals_only=True, subset_by_index=[0, count - 1])
         if not value[0] > 0.0:
             raise ConvergenceError(unstable(nodal_diameter, speed))
         out: FloatArray = np.sqrt(value) / (2.0 * np.pi)
         return out
-
-
-def _dense(A: CyclicMatrix, n: int) -> Field:
-    """K_n of a projected matrix."""
-    phase = phase_of(n, A.n_sectors)
-    K = A.same + phase * A.following + phase.conjugate() * A.following.T
-    return np.asarray(K.real if phase.imag == 0.0 else 0.5 * (K + K.conj().T))
-
-
-def _independent(V: FloatArray) -> FloatArray:
-    """Orthonormal basis (n, r) of the span of V (n, m) but for directions that are rounding."""
-    V = V / np.maximum(np.linalg.norm(V, axis=0), np.finfo(float).tiny)
-    U, size, _ = np.linalg.svd(V, full_matrices=False)
-    return np.asarray(U[:, size > 1e4 * EPS * size[0]])
 
 
 def with_coriolis(frequency: FloatArray, U: Field, coriolis: csr_array, speed: float) -> FloatArray:

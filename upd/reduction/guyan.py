@@ -4,21 +4,29 @@ of all it depends on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve, lapack
+from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.csgraph import connected_components
 
 from upd.cache.arrays import Store, load_arrays, save_arrays, trim, unreadable
 from upd.cache.files import locked
 from upd.errors import ConvergenceError
 from upd.linalg.amg import compliance_amg
-from upd.linalg.common import EPS, Condensation, checked_dofs, checked_vectors, log
+from upd.linalg.common import (
+    EPS,
+    Condensed,
+    checked_dofs,
+    checked_vectors,
+    is_free,
+    log,
+    softest_motion,
+)
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import choose
 from upd.linalg.symmetric import Matrix, checked, stored, submatrix_of
@@ -34,49 +42,6 @@ RIGID_NAMES = (
     "rotation about z",
 )
 _REMEDY = "To fix it: hold the distant set."
-
-
-@dataclass(frozen=True, repr=False)
-class Condensed(Condensation):
-    """A body condensed on k kept dofs.
-
-    Attributes
-    ----------
-    S : (k, k) ndarray
-        N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
-    recover : callable
-        u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
-    solver
-        As of `Condensation`.
-    factor_nnz, peak_bytes : int
-        Size of the factorisation (0 with multigrid: not known).
-    n_dof : int
-        n.
-    """
-
-    n_dof: int = 0
-    _compliance: list[FloatArray] = field(default_factory=list, repr=False)
-
-    def compliance(self) -> FloatArray:
-        """Compliance at the kept dofs; computed once, by Cholesky.
-
-        Returns
-        -------
-        (k, k) ndarray
-            S^-1 in mm/N, exactly symmetric, read-only.
-
-        Raises
-        ------
-        ConvergenceError
-            When S is not positive definite: the body floats.
-        """
-        if not self._compliance:
-            self._compliance.append(inverse_definite(self.S))
-        return self._compliance[0]
-
-    def under(self, force: FloatArray) -> FloatArray:
-        """Displacements u (n,) of all dofs of K under forces (k,) at the kept ones."""
-        return self.recover(self.compliance() @ force)
 
 
 def condense(
@@ -153,11 +118,11 @@ def condense(
     choice = choose(n, len(kept), solver=solver, memory_limit_bytes=memory_limit_bytes)
     log.info("condensation of %d dofs onto %d by %s: %s", n, len(kept), choice.name, choice.why)
     if choice.name == "amg" and len(kept) < n:
-        return _by_multigrid(A, kept, modes, layout, points)
+        return compliance_amg(A, kept, modes, layout=layout, points=points)
     direct = "auto" if choice.name == "amg" else choice.name
     found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
     _refuse_floating(found.S, A.diagonal()[kept])
-    return Condensed(**vars(found), n_dof=n)
+    return found
 
 
 def require_held(A: Matrix, modes: FloatArray | None) -> None:
@@ -173,93 +138,10 @@ def require_held(A: Matrix, modes: FloatArray | None) -> None:
     Raises
     ------
     ConvergenceError
-        Naming the modes that cost no energy.
-    """
-    free = _free_motions(A, modes)
-    if free:
-        raise ConvergenceError(f"The body floats: {free}. {_REMEDY}")
-
-
-def _by_multigrid(
-    A: Matrix,
-    kept: NDArray[np.int64],
-    modes: FloatArray | None,
-    layout: ArrayLike | None,
-    points: ArrayLike | None,
-) -> Condensed:
-    found = compliance_amg(A, kept, modes, layout=layout, points=points)
-    S = inverse_definite(found.C)
-
-    def recover(u_kept: FloatArray) -> FloatArray:
-        u = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
-        if u.ndim == 1:
-            return found.solve(S @ u)
-        return (
-            np.stack([found.solve(S @ column) for column in u.T], axis=1)
-            if u.size
-            else np.zeros((A.shape[0], u.shape[1]))
-        )
-
-    found.C.flags.writeable = False
-    return Condensed(S, recover, "amg", 0, 0, A.shape[0], [found.C])
-
-
-def inverse_definite(S: FloatArray) -> FloatArray:
-    """Inverse of a symmetric positive definite matrix by LAPACK potrf and potri.
-
-    Raises ConvergenceError when it is not definite.
-    """
-    factor, info = lapack.dpotrf(np.asfortranarray(S), lower=1)
-    if info == 0:
-        inverse, info = lapack.dpotri(factor, lower=1)
-    if info != 0:
-        raise ConvergenceError(
-            f"The condensed stiffness is not positive definite (row {abs(info) - 1}): the "
-            f"body floats. {_REMEDY}"
-        )
-    lower = np.tril(inverse)
-    full: FloatArray = lower + np.tril(inverse, -1).T
-    full.flags.writeable = False
-    return full
-
-
-def _refuse_floating(S: FloatArray, weight: FloatArray) -> None:
-    """Raise ConvergenceError when S is singular to rounding.
-
-    That is the rounding of the diagonal `weight` (k,) of K it was subtracted from.
-    """
-    root = np.sqrt(weight)
-    scaled = S / np.outer(root, root)
-    v = np.random.default_rng(0).standard_normal(len(root))
-    try:
-        factor = cho_factor(scaled, lower=True, check_finite=False)
-        for _ in range(2):
-            v = cho_solve(factor, v, check_finite=False)
-            v /= np.linalg.norm(v)
-    except np.linalg.LinAlgError:
-        v = np.linalg.eigh(scaled)[1][:, 0]
-    energy = float(v @ scaled @ v)
-    if not energy > _rounding(len(v)):
-        most = int(np.argmax(np.abs(v / root)))
-        raise ConvergenceError(
-            "The body floats: nothing but the kept dofs holds it. A motion of relative "
-            f"energy {energy:.1e} moves "
-            f"entry {most} of the kept dofs most. {_REMEDY}"
-        )
-
-
-def _rounding(n: int) -> float:
-    """Relative energy below which a motion of n dofs is free: the same bound as Motion.is_free."""
-    return float(10 * EPS * np.sqrt(n))
-
-
-def _free_motions(A: Matrix, modes: FloatArray | None) -> str:
-    """Text of the rigid motions that cost no energy, of the body or of a loose part of it.
-
-    Empty when there are none or no modes.
+        Naming the modes that cost no energy, of the body or of a loose part of it.
     """
     if modes is None:
-        return ""
+        return
     n_part, part = connected_components(stored(A), directed=False)
     found = []
     for number in range(n_part):
@@ -271,7 +153,29 @@ def _free_motions(A: Matrix, modes: FloatArray | None) -> str:
                 "" if n_part == 1 else f"a loose part of {len(dofs)} dofs, the first {dofs[0]}, is "
             )
             found.append(where + "free in " + ", ".join(names))
-    return "; ".join(found)
+    if found:
+        raise ConvergenceError(f"The body floats: {'; '.join(found)}. {_REMEDY}")
+
+
+def _refuse_floating(S: FloatArray, weight: FloatArray) -> None:
+    """Raise ConvergenceError when S is singular to rounding.
+
+    That is the rounding of the diagonal `weight` (k,) of K it was subtracted from.
+    """
+    try:
+        factor = cho_factor(S, lower=True, check_finite=False)
+        v, energy = softest_motion(S, partial(cho_solve, factor, check_finite=False), weight)
+    except np.linalg.LinAlgError:
+        root = np.sqrt(weight)
+        v = np.linalg.eigh(S / np.outer(root, root))[1][:, 0] / root
+        energy = float(v @ S @ v)
+    if is_free(v, energy):
+        most = int(np.argmax(np.abs(v)))
+        raise ConvergenceError(
+            "The body floats: nothing but the kept dofs holds it. A motion of relative "
+            f"energy {energy:.1e} moves "
+            f"entry {most} of the kept dofs most. {_REMEDY}"
+        )
 
 
 def _null_motions(K: Matrix, R: FloatArray) -> list[str]:
@@ -285,7 +189,7 @@ def _null_motions(K: Matrix, R: FloatArray) -> list[str]:
     U = U[:, size > len(R) * EPS * size.max(initial=0.0)]
     V = U / root[:, None]
     energy, y = np.linalg.eigh(V.T @ (K @ V))
-    null = U @ y[:, energy <= _rounding(len(R))]
+    null = U @ y[:, [is_free(R, one) for one in energy]]
     share = np.linalg.norm(null.T @ W, axis=0)
     # A hinge away from the centroid is a rotation with some translation: name whatever has more
     # than a tenth of itself in it.
@@ -345,6 +249,7 @@ def _made(store: Store, path: Path, make: Callable[[], Condensed], solver: str) 
 
 
 def _read(store: Store, path: Path, make: Callable[[], Condensed]) -> Condensed | None:
+    """The condensation on disk; the factor behind `recover` is made when first asked for."""
     arrays = load_arrays(path)
     if arrays is None:
         return None
@@ -357,27 +262,19 @@ def _read(store: Store, path: Path, make: Callable[[], Condensed]) -> Condensed 
             or not (np.isfinite(S).all() and np.isfinite(C).all())
         ):
             raise ValueError("the arrays are not those of a condensation")
-        revived = _revived(arrays, make, store.counts)
+        n_dof, nnz, peak = (int(v) for v in arrays["sizes"])
+        solver = str(arrays["solver"])
     except (KeyError, ValueError, TypeError) as problem:
         unreadable(path, problem)
         return None
     store.counts["disk"] += 1
-    return revived
-
-
-def _revived(
-    arrays: Mapping[str, NDArray[Any]], make: Callable[[], Condensed], counts: dict[str, int]
-) -> Condensed:
-    """The condensation read; the factor behind `recover` is made when first asked for."""
     again: list[Condensed] = []
 
-    def recover(u_kept: NDArray[np.float64]) -> NDArray[np.float64]:
+    def recover(u_kept: FloatArray) -> FloatArray:
         if not again:
             again.append(make())
-            counts["factor"] += 1
+            store.counts["factor"] += 1
         return again[0].recover(u_kept)
 
-    n_dof, nnz, peak = (int(v) for v in arrays["sizes"])
-    C = arrays["C"]
     C.flags.writeable = False
-    return Condensed(arrays["S"], recover, str(arrays["solver"]), nnz, peak, n_dof, [C])
+    return Condensed(S, recover, solver, nnz, peak, n_dof, [C])

@@ -4,12 +4,17 @@ of force, in place of one for every kept dof.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
 from upd.linalg.common import AT_ONCE, EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
-from upd.linalg.schur import Solved, Solver
+from upd.linalg.schur import DirectSolver, Solved
+
+if TYPE_CHECKING:
+    from upd.linalg.multigrid import MultigridSolver
 
 #: relative error in energy of one product
 ACCURACY = 1e-10
@@ -66,7 +71,7 @@ class LearnedCompliance:
 
     def __init__(
         self,
-        solver: Solver,
+        solver: DirectSolver | MultigridSolver,
         n_dof: int,
         kept: ArrayLike,
         start: FloatArray,
@@ -76,7 +81,7 @@ class LearnedCompliance:
 
         Parameters
         ----------
-        solver : Solver
+        solver : DirectSolver or MultigridSolver
             Of its stiffness (n, n) without the fixed dofs.
         n_dof : int
             n.

@@ -42,10 +42,18 @@ from scipy.linalg import qr
 
 from upd.errors import InputError
 from upd.linalg.amg import amg_solve
-from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors
+from upd.linalg.common import (
+    EPS,
+    Condensed,
+    FloatArray,
+    IntArray,
+    checked_dofs,
+    checked_vectors,
+    inverse_definite,
+)
 from upd.linalg.schur import factorise
 from upd.linalg.symmetric import checked, submatrix_of
-from upd.reduction.guyan import Condensed, condense, inverse_definite
+from upd.reduction.guyan import condense
 
 
 def motions_left(modes: ArrayLike, held: ArrayLike) -> FloatArray:
@@ -125,15 +133,22 @@ def condense_held_in_mean(
     if w.ndim != 1:
         raise InputError(f"weights have the shape {w.shape}: give one per dof, ({n},).")
     W = w[:, None] * R
+    mean = R.T @ W
+    size = np.linalg.svd(mean, compute_uv=False)
+    if not size[-1] > len(R) * EPS * float((np.abs(w)[:, None] * R**2).sum()):
+        raise InputError(_LOOSE)  # weights of both signs that cancel
     held = _support(R, np.setdiff1d(np.flatnonzero(w), kept))
-    mean = _regular(R.T @ W, R, w)
     inner = np.setdiff1d(np.arange(n), held)
     K_h, at = submatrix_of(A, inner), np.searchsorted(inner, kept)
     places = None if layout is None else np.asarray(layout)[inner]
     near: dict[str, Any] = {"layout": places, "points": points}
     found = condense(K_h, at, solver=solver, rigid_modes=R[inner], **near, **more)
     X = np.zeros_like(W)
-    X[inner] = _loaded(K_h, W[inner], found.solver, R[inner], near)
+    if found.solver == "amg":
+        loads = [amg_solve(K_h, load, R[inner], **near).x for load in W[inner].T]
+        X[inner] = np.transpose(loads)
+    else:
+        X[inner] = factorise(K_h, solver=found.solver)(W[inner])
     C_h = found.compliance()
     T = np.linalg.solve(mean, R[kept].T)
     across = X[kept] @ T
@@ -163,27 +178,10 @@ def _support(R: FloatArray, candidates: IntArray) -> IntArray:
     return np.sort(candidates[order[:m]])
 
 
-def _regular(mean: FloatArray, R: FloatArray, w: FloatArray) -> FloatArray:
-    """R'W, refused when a motion has no mean: weights of both signs that cancel."""
-    size = np.linalg.svd(mean, compute_uv=False)
-    if not size[-1] > len(R) * EPS * float((np.abs(w)[:, None] * R**2).sum()):
-        raise InputError(_LOOSE)
-    return mean
-
-
 _LOOSE = (
     "the weights do not hold the body: its rigid motions have no mean of their own over them. To "
     "fix it: give three nodes or more, not on one line, with positive weights."
 )
-
-
-def _loaded(
-    K: Any, loads: FloatArray, solver: str, modes: FloatArray, near: dict[str, Any]
-) -> FloatArray:
-    """K^-1 loads by the solver that condensed K."""
-    if solver == "amg":
-        return np.stack([amg_solve(K, load, modes, **near).x for load in loads.T], axis=1)
-    return factorise(K, solver="auto" if solver == "none" else solver)(loads)
 
 
 __all__ = ["condense_held_in_mean", "motions_left"]

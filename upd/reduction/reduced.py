@@ -65,11 +65,6 @@ class ReducedModel(Shown):
     n_dof: int
 
     @property
-    def n_boundary(self) -> int:
-        """k."""
-        return len(self.boundary)
-
-    @property
     def n_modes(self) -> int:
         """m."""
         return len(self.fixed_frequency)
@@ -152,7 +147,7 @@ class ReducedModel(Shown):
                 f"{n_modes} modes of a reduced model that has {self.n_modes}: give 0 to "
                 f"{self.n_modes}."
             )
-        r = self.n_boundary + n_modes
+        r = len(self.boundary) + n_modes
         return replace(
             self,
             K=self.K[:r, :r].copy(),

@@ -23,6 +23,7 @@ from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.contact.solution import raised
 from upd.contact.model import ContactModel
 from upd.fem import rigid_body_modes
+from upd.linalg.symmetric import whole
 from upd.progress import Stages
 from upd.report.notebook import RunResult
 from upd.results import Case, Check
@@ -219,7 +220,7 @@ def test_full_stick_is_both_bodies_glued() -> None:
     dofs = np.concatenate([np.arange(n_up), n_up + np.arange(n_low)])
     for k in range(3):
         dofs[3 * upper.contact + k] = n_up + 3 * lower.contact + k
-    both = sparse.block_diag([upper.K.whole(), lower.K.whole()]).tocoo()
+    both = sparse.block_diag([whole(upper.K), whole(lower.K)]).tocoo()
     K = sparse.csr_array((both.data, (dofs[both.row], dofs[both.col])), shape=(n_up + n_low,) * 2)
     used = np.unique(dofs)
     held_low = n_up + (3 * lower.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()

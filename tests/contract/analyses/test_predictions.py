@@ -12,7 +12,7 @@ from upd.batch.engine import time_left
 from upd.cli.app import main
 from upd.errors import InputError
 from upd.linalg import predict
-from upd.linalg.select import USUAL, Solid, threads_used
+from upd.linalg.select import SPEEDUP, Solid, threads_used
 from upd.mesh import recipes
 from upd.scene import load_scene
 from upd.vary.solve import changed
@@ -199,7 +199,7 @@ def test_plan_counts_the_second_factor_of_a_damper_held_in_the_mean(scene: str, 
     count = mean.size["damper"]
     solid = Solid.of(count["hexes"], count["nodes"], 8)
     again = predict(3 * count["nodes"], 0, "pardiso", solid)
-    gain = {1: 1.0}.get(threads_used(), USUAL.speedup)
+    gain = {1: 1.0}.get(threads_used(), SPEEDUP)
     assert gain * (mean.seconds - nodes.seconds) == pytest.approx(
         2.0 * (again.seconds + 5.0 * again.substitution()), rel=1e-6
     )

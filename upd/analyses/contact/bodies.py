@@ -35,15 +35,16 @@ from upd.contact.products import (
 )
 from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
+from upd.linalg.common import Condensed
 from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.parallel import in_parallel
-from upd.linalg.schur import DirectSolver, Solver
+from upd.linalg.schur import DirectSolver
 from upd.linalg.select import PRODUCTS
 from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
 from upd.mesh.hexmesh import upper_and_lower
 from upd.progress import Stages
-from upd.reduction.guyan import Condensed, condense, require_held, stored_condensation
+from upd.reduction.guyan import condense, require_held, stored_condensation
 from upd.reduction.learned import LearnedCompliance
 from upd.reduction.mean_held import condense_held_in_mean, motions_left
 from upd.results import Case, Check
@@ -200,7 +201,7 @@ def _by_products(
     K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)[free]
     require_held(K, modes)
     held = {"xyz".index(plane[-1]): odd for plane, odd in plan.families[components].items()}
-    solver: Solver = (
+    solver = (
         MultigridSolver(K, modes, layout=free, points=mesh.points)
         if name == "amg"
         else DirectSolver(K, name)
@@ -336,5 +337,5 @@ def _mesh_error(
         data = solution.plan.scene.materials[body.name]
         mean = body.side * float(nodal @ u[body.contact, 2]) / float(nodal.sum())
         whole += mean - share.finite_body - bulk.half_space_mean(patch, force, data.E, data.nu)
-        far += share.far_mesh
+        far += share.fitted - share.finite_body
     return whole - far, far

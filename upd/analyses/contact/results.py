@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from upd.analyses import base
 from upd.analyses.contact.plan import direction_name, normal_loads
 from upd.analyses.contact.solution import ContactSolution, NormalCase, References, TangentialCase
-from upd.contact.bulk import without_body
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.patch import consistent_average
 from upd.mesh import recipes
@@ -218,7 +217,7 @@ def _within_3a(case: NormalCase) -> float:
 def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
     # A secant counts from where the faces touch first; a gap that is left at the apex of a curved
     # body is the lattice's, an overlap is the file's.
-    touch = solution.model.first_touch
+    touch = float(solution.model.gap.min())
     touch = min(0.0, touch) if solution.curved else touch
     at, secant = case.case, case.force / (case.solution.approach - touch)
     raw = (q.K_N_TANGENT_RAW, case.stiffness), (q.K_N_SECANT_RAW, secant)
@@ -226,7 +225,7 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
     if not solution.curved:
         return out + _stiffness_of_faces(solution, case, touch)
     bodies = case.finite_body / case.force
-    K_N, rows = without_body(case.stiffness, bodies), list[tuple[Quantity, float]]()
+    K_N, rows = 1.0 / (1.0 / case.stiffness - bodies), list[tuple[Quantity, float]]()
     if case.shares:
         # Of the approach within 3a, 1.5 F / d as F goes with d^1.5, what the thesis takes for the
         # contact's (its section 6.5): 23 % of a half-space's displacement lies beyond 3a, so it is
@@ -234,12 +233,12 @@ def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -
         within = _within_3a(case)
         if within > _ROUNDING * case.solution.approach:
             rows.append((q.K_N_TANGENT_3A, 1.5 * case.force / within))
-        rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, without_body(secant, bodies))]
+        rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, 1.0 / (1.0 / secant - bodies))]
     stuck = next((total for total, _ in case.stuck.values()), None)
     if stuck is not None and known:
         rows.append((q.K_T_INITIAL_RAW, stuck))
         if case.shear_shares:
-            K_T = without_body(stuck, case.finite_body_shear)
+            K_T = 1.0 / (1.0 / stuck - case.finite_body_shear)
             rows += [(q.K_T_INITIAL, K_T), (q.K_T_OVER_K_N, K_T / K_N)]
     return out + _beside(at, known, *rows)
 

@@ -32,7 +32,7 @@ from upd.contact.coulomb_conditions import STICK
 from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.patch import ContactMeasures, LocatedArea, Patch, located_area, measure
+from upd.contact.patch import ContactMeasures, Patch, located_area, measure
 from upd.errors import ConvergenceError
 from upd.reference import (
     HertzPoint,
@@ -412,7 +412,7 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
             )
             for k, f in zip(faces, forces, strict=True)
         ]
-        located = LocatedArea(sum(a.area for a in found), sum(a.resolution for a in found))
+        located = sum(area for area, _ in found), sum(left for _, left in found)
     if solution.curved:
         return measure(solution.model.patch, forces[0], located, faces[0].whole(pressure))
     assert located is not None
@@ -421,11 +421,11 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
         none,
         none,
         none,
-        located.area,
+        located[0],
         sum(float(k.area()[f > 0.0].sum()) for k, f in zip(faces, forces, strict=True)),
         float(pressure.max()),
-        load / located.area if located.area else 0.0,
-        located.resolution,
+        load / located[0] if located[0] else 0.0,
+        located[1],
     )
 
 

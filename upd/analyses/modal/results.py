@@ -69,7 +69,7 @@ def _reduction_results(reductions: Sequence[ReducedBlade]) -> list[Result]:
     pairs = sorted(pair for r in reductions for pair in zip(r.full, r.frequency, strict=True))
     return [
         q.REDUCTION_MODES.of(sum(r.model.n_modes for r in reductions), REDUCED),
-        q.REDUCTION_BOUNDARY.of(sum(r.model.n_boundary for r in reductions), REDUCED),
+        q.REDUCTION_BOUNDARY.of(sum(len(r.model.boundary) for r in reductions), REDUCED),
         *(
             q.F_REDUCED.of(f, REDUCED, full, "full model", n=k)
             for k, (full, f) in enumerate(pairs, 1)
