@@ -318,7 +318,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
     "analyses": 10642,
-    "hbm": 6231,
+    "hbm": 6081,
     "contact": 3294,
     "linalg": 2628,
     "scene": 2197,
@@ -338,7 +338,7 @@ ROOM_LINES = {
     "matrices": 616,
     "root": 522,
     "cache": 443,
-    "dynamics": 259,
+    "dynamics": 245,
     "scenes": 212,
     "manual": 113,
 }

@@ -130,7 +130,19 @@ class PathProblem(NamedTuple):
 
 
 def across(x: FloatArray, rate: float) -> FloatArray:
-    """Normal (n + 1,) of the plane of one parameter, on the side of the sign of `rate`."""
+    """Normal of the plane of one parameter, in scaled coordinates.
+
+    Parameters
+    ----------
+    x : (n,) ndarray
+        Unknowns.
+    rate : float
+        Its sign is that of the side.
+
+    Returns
+    -------
+    (n + 1,) ndarray
+    """
     normal = np.zeros(len(x) + 1)
     normal[-1] = np.sign(rate)
     return normal

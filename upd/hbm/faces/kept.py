@@ -371,9 +371,8 @@ def given_blades(  # type: ignore[no-untyped-def]
     law : tuple of three (n,) ndarray
         Friction, weights of displacements against forces [N/mm].
     past : tuple
-        Whether it holds a guess of every sample, else each starts from the one before, and the
-        first from its own row; forces [N], minus gaps and slips of the step [mm] (N, 3 n), states
-        (N, n), and `upd.hbm.faces.kept.kept_inverses`; overwritten.
+        As in `solve_sample`; overwritten. Where it holds no guess of every sample, each starts from
+        the one before, and the first from its own row.
     at : tuple of ndarray
         Overwritten: the damper's motion, velocity and acceleration in steps (3, r), -W w_ref of the
         first sample (3 n,), and x0 (3 n,).
