@@ -15,7 +15,7 @@ from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import Mesh, recipes
-from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
+from upd.mesh.checks import Pairs, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
 from upd.plot.answer_table import AnswerTable
 from upd.progress import Listener, Stages
@@ -111,7 +111,8 @@ def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
             ),
             (("", "", ""), "aspect ratio", f"{found.aspect:.1f}", found.longest),
         ):
-            place = ", ".join(f"{x + 0.0:.3g}" for x in centre_of(mesh, worst))
+            centre = mesh.points[mesh.hexes[worst, :8]].mean(axis=0)
+            place = ", ".join(f"{x + 0.0:.3g}" for x in centre)
             rows.append((*row, measure, value, place))
     heads = ("body", "#nodes", "#hexahedra", "worst of", "#value", "at x, y, z, mm")
     print_table(console, AnswerTable("Bodies and their worst elements", heads, tuple(rows)))

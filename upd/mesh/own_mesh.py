@@ -21,6 +21,7 @@ import numpy as np
 from upd.errors import InputError, OwnMeshError
 from upd.mesh import FloatArray, IntArray, Mesh
 from upd.mesh.checks import OUT_OF_LINE, in_pairs
+from upd.mesh.fields import field_faults, whole
 from upd.mesh.hexmesh import CENTRES, FACE_SIZE, NamedElements, boundary_faces
 
 #: beginnings of the names of elements without a volume: plane and axisymmetric ones, shells,
@@ -58,7 +59,11 @@ def read_inp(path: Path) -> tuple[FloatArray, list[NamedElements]]:
                 "coordinates"
             )
         if word == "NODE":
-            deck.add_nodes(block)
+            found = [_number(int, line, 0) for line in block.lines]
+            for label, line in zip(found, block.lines, strict=True):
+                deck.nodes[label] = [_number(float, line, k) for k in (1, 2, 3)]
+            if "NSET" in options:
+                deck.nsets.setdefault(options["NSET"], []).extend(found)
         elif word == "ELEMENT":
             deck.add_elements(block)
         elif word in ("NSET", "ELSET") and word in options:
@@ -95,13 +100,6 @@ class _Deck:
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
     nsets: dict[str, list[int]] = field(default_factory=dict)
     elsets: dict[str, list[int]] = field(default_factory=dict)
-
-    def add_nodes(self, block: _Block) -> None:
-        found = [_number(int, line, 0) for line in block.lines]
-        for label, line in zip(found, block.lines, strict=True):
-            self.nodes[label] = [_number(float, line, k) for k in (1, 2, 3)]
-        if "NSET" in block.options:
-            self.nsets.setdefault(block.options["NSET"], []).extend(found)
 
     def add_elements(self, block: _Block) -> None:
         kind = block.options.get("TYPE", "").upper()
@@ -248,6 +246,8 @@ class MeshFile:
     def __post_init__(self) -> None:
         if not self.scale > 0.0:
             raise InputError(f"scale: {self.scale!r} is not positive; 1000 for a file in metres")
+        if faults := field_faults(self):
+            raise InputError("; ".join(faults))
 
 
 @dataclass(frozen=True)
@@ -280,12 +280,7 @@ class SectorFile(MeshFile):
         Number of blades.
     """
 
-    n_sectors: int = 0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.n_sectors < 2:
-            raise InputError(f"n_sectors: {self.n_sectors} is less than 2; give that of the disk")
+    n_sectors: int = whole(0, 2, why="give that of the disk")
 
 
 def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
@@ -320,20 +315,13 @@ def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
     # what a scene may give
     build.__annotations__["params"] = RigFile if rig else SectorFile if sector else MeshFile
     vars(module)["build"] = build
-    other = "bladed disk" if sector else _contact_analysis(meshes)
+    # flat where all contact nodes lie in one plane, to what pairs of nodes may be out of line
+    sets = [mesh.points[mesh.nodes.get("contact", [])] for mesh in meshes.values()]
+    extents = [np.ptp(points, axis=0) for points in sets if len(points)]
+    flat = bool(extents) and all(x[2] <= OUT_OF_LINE * x.max() for x in extents)
+    other = "bladed disk" if sector else "flat contact" if flat else "curved contact"
     vars(module)["ANALYSIS"] = "rig" if rig else other
     return module
-
-
-def _contact_analysis(meshes: Mapping[str, Mesh]) -> str:
-    """Flat where all contact nodes lie in one plane, curved else."""
-    faces = [
-        mesh.points[mesh.nodes["contact"]] for mesh in meshes.values() if "contact" in mesh.nodes
-    ]
-    # To what pairs of nodes may be out of line.
-    extents = [np.ptp(points, axis=0) for points in faces if len(points)]
-    flat = bool(extents) and all(x[2] <= OUT_OF_LINE * x.max() for x in extents)
-    return "flat contact" if flat else "curved contact"
 
 
 def _scaled(meshes: Mapping[str, Mesh], params: MeshFile) -> dict[str, Mesh]:
