@@ -260,7 +260,12 @@ def forced_response(
     below = _BEYOND * max(orders) * float(f.max(initial=0.0))
     reduced = _reduced(K, M, rows.used, modes, below, whole=damping is not None)
     Kd, Md = (K.toarray(), M.toarray()) if reduced is None else (reduced.K, reduced.M)
-    _refuse_blurred(Kd, Md)
+    if count := _blurred(Kd, Md):
+        raise InputError(
+            f"forced_response: {count} elastic modes lie so far below the highest one that "
+            "rounding blurs them; "
+            "reduce with fewer modes (modes=), or leave out dofs that are far stiffer than the rest"
+        )
     at = np.eye(n)[rows.used] if reduced is None else reduced.at(rows.used)
     points = _contacts(joints, rows.matrix(closing) @ at, [rows.matrix(s) @ at for s in sliding])
     answer = hbm.frequency_response(
@@ -467,15 +472,6 @@ def _refuse_fixed(K: csr_array, M: csr_array) -> None:
             f"forced_response: {len(found)} rows, the first {found[0]}, have no mass and a zero on "
             "the diagonal of K, as Lagrange multipliers have: leaving them out would drop their "
             "constraints; export the matrices with the constraints eliminated"
-        )
-
-
-def _refuse_blurred(K: FloatArray, M: FloatArray) -> None:
-    if count := _blurred(K, M):
-        raise InputError(
-            f"forced_response: {count} elastic modes lie so far below the highest one that "
-            "rounding blurs them; "
-            "reduce with fewer modes (modes=), or leave out dofs that are far stiffer than the rest"
         )
 
 
