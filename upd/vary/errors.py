@@ -168,7 +168,7 @@ def bound(key: Key, run: SolvedVariation, levels: Sequence[SolvedVariation]) -> 
 def half_cost(
     problem: Problem, plan: Any, source: str, seconds: float, order: float
 ) -> tuple[float | None, str]:
-    """Seconds that half of an error of the order adds to a run of so many, or why there are none."""
+    """Seconds that half of an error of the order adds to such a run, or why there are none."""
     factor = 2.0 ** (1.0 / order)
     try:
         finer = Variation(source, "", problem.finer(plan, source, factor), 1.0 / factor)
