@@ -54,7 +54,7 @@ from scipy.stats import t as student
 
 from upd.analyses.forced.model import quiet
 from upd.errors import ConvergenceError, UpdError, one_line
-from upd.fitting.responses import STEP, FitResponses, is_seated
+from upd.fitting.responses import STEP, FitResponses
 from upd.fitting.targets import (
     CONTACT_TOTALS,
     PEAK_NUMBERS,
@@ -125,7 +125,13 @@ class Residuals:
         self.target = np.concatenate([*values, *(one.values for one in targets.curves)])
         self.known = bool(targets.curves) or targets.numbers[0].half_width is not None
         self.low, self.high = np.array([one.bounds for one in responses.parameters]).T
-        self.curves = [first_noise(one) for one in targets.curves]
+        self.curves = []
+        for one in targets.curves:
+            noise = one.relative or 0.0, one.constant or 0.0
+            if not one.stated:
+                # each point by its own size, down to where differences of the highest are rounding
+                noise = 1.0, float(np.finfo(float).eps ** 0.5 * one.curve.magnitude.max())
+            self.curves.append(FittedCurve(one, *noise, estimated=not one.stated))
         self.scale = self._scales([one.curve.magnitude for one in targets.curves])
         ends = self.numbers + np.cumsum([0, *(len(one.values) for one in targets.curves)])
         #: values of every curve
@@ -317,15 +323,6 @@ class FittedCurve:
         H = self.target.curve.accelerance
         computed = self.computed if self.target.curve.is_complex else np.abs(self.computed)
         return float(np.linalg.norm(computed - H) / np.linalg.norm(H))
-
-
-def first_noise(target: CurveTarget) -> FittedCurve:
-    """Before any fit: as stated, else each point by its own size."""
-    if target.stated:
-        return FittedCurve(target, target.relative or 0.0, target.constant or 0.0, False)
-    # down to where differences of the highest are rounding
-    floor = float(np.finfo(float).eps ** 0.5 * target.curve.magnitude.max())
-    return FittedCurve(target, 1.0, floor, True)
 
 
 def as_complex(target: CurveTarget, parts: Array) -> NDArray[np.complex128]:
@@ -639,7 +636,7 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
     """
     made = residuals.responses
     scene, targets = made.scene, made.targets
-    friction = bool(targets.ratios) or (made.cheap and not is_seated(scene))
+    friction = bool(targets.ratios) or (made.cheap and not made.seated)
     asked = candidates(scene, targets, friction=friction)
     responses = FitResponses(scene, asked, made.parameters, needed=False, like=made)
     try:
