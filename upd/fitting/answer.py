@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.fitting.residuals import SHOWN, FittedCurve, FurtherMeasurement, Knowledge, Start, is_bent
+from upd.fitting.residuals import SHOWN, FittedCurve, Further, Knowledge, Start, is_bent
 from upd.fitting.targets import FitTarget, VariedInput, fitted_scene
 from upd.plot.answer_table import AnswerTable, Rounded
 from upd.plot.chart import Axis, Band, Chart, Trace
@@ -73,8 +73,11 @@ class Fit(FigureAnswer):
     ends : ndarray
         (n, 2) ln(factor) between which sets of inputs fit as well, the others fitted; nan where
         these were not sought.
-    further : tuple of FurtherMeasurement
-        What measurements that were not made would tell, the most telling first.
+    widest : float
+        Half-width of the widest direction, as a factor of the inputs.
+    further : tuple of (FitTarget, float, float)
+        What measurements that were not made would tell, the most telling first: the number with the
+        half-width that is assumed, half of what the inputs leave it, and the widest then.
     starts : list of Start
         Where every start ended, the best first.
     directions : str
@@ -96,7 +99,8 @@ class Fit(FigureAnswer):
     slopes: Array
     known: Knowledge
     ends: Array
-    further: tuple[FurtherMeasurement, ...]
+    widest: float
+    further: tuple[Further, ...]
     starts: list[Start]
     directions: str
     evaluations: int
@@ -287,19 +291,18 @@ def _measurements(found: Fit) -> AnswerTable:
         (
             one.name,
             one.unit,
-            Rounded(one.half_width, ".2g"),
-            *_distinct(one.low, one.high),
-            Rounded(one.then),
+            Rounded(one.half_width or 0.0, ".2g"),
+            *_distinct(one.value - spread, one.value + spread),
+            Rounded(then),
         )
-        for one in found.further
-        if one.then < one.widest**_GAIN
+        for one, spread, then in found.further
+        if then < found.widest**_GAIN
     )[:_FURTHER]
-    widest = f"{found.further[0].widest:.3g}" if found.further else ""
     heads = ("number", "unit", "#half-width", "#from", "#to", "#factor then")
     note = (
-        f"The least known direction of the inputs is known within a factor of {widest} today, and "
-        "of the last column after the measurement. Half-widths are assumed; the fit predicts "
-        "from and to."
+        "The least known direction of the inputs is known within a factor of "
+        f"{found.widest:.3g} today, and of the last column after the measurement. Half-widths are "
+        "assumed; the fit predicts from and to."
     )
     return AnswerTable("Next measurement", heads, rows, note)
 

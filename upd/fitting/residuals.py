@@ -43,7 +43,7 @@ import itertools
 import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -569,31 +569,9 @@ def profile_ends(residuals: Residuals, known: Knowledge, best: Array, k: int) ->
 # -- what to measure next --------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class FurtherMeasurement:
-    """What a measurement that was not made would tell.
-
-    Attributes
-    ----------
-    name, unit
-        Of the number, as a target names it.
-    low, high
-        What the fit predicts for it today.
-    half_width
-        Assumed of the measurement.
-    widest
-        Half-width of the widest direction today, as a factor of the inputs.
-    then
-        The same with the measurement.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    half_width: float
-    widest: float
-    then: float
+#: a number with the half-width that is assumed of its measurement, half of what the inputs leave it
+#: today, and the half-width of the widest direction then, as a factor of the inputs
+Further = tuple[FitTarget, float, float]
 
 
 def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targets:
@@ -624,8 +602,9 @@ def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targe
     return Targets(tuple(one for one in found if one.name not in made))
 
 
-def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasurement, ...]:
-    """Measurements by how much each would narrow the widest direction, the most telling first.
+def rank_measurements(residuals: Residuals, best: Array) -> tuple[float, tuple[Further, ...]]:
+    """Half-width of the widest direction today, as a factor of the inputs, and measurements by how
+    much each would narrow it, the most telling first.
 
     Parameters
     ----------
@@ -644,7 +623,7 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
             value, slope = responses.at(best)
     except UpdError as error:
         log.info("further measurements: %s", one_line(error))
-        return ()
+        return math.nan, ()
     J = residuals.jacobian(best)
     if not residuals.known:
         each = [_half(one.unit, one.value, targets) for one in targets.numbers]
@@ -656,9 +635,8 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
         if np.isfinite(v) and np.isfinite(g).all():
             half, spread = _half(one.unit, v, targets), float(np.sqrt(g @ C @ g))
             then = _widest(C - np.outer(C @ g, C @ g) / (half**2 + spread**2))
-            ends = v - spread, v + spread
-            out.append(FurtherMeasurement(one.name, one.unit, *ends, half, now, then))
-    return tuple(sorted(out, key=lambda one: one.then))
+            out.append((replace(one, value=v, half_width=half), spread, then))
+    return now, tuple(sorted(out, key=lambda one: one[2]))
 
 
 def _half(unit: str, value: float, targets: Targets) -> float:

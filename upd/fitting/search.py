@@ -148,7 +148,7 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         status = status_of(residuals, known, found)
     ends, rises = _ends(residuals, known, best, stages)
     with stages("further measurements", "what each would narrow"):
-        further = rank_measurements(residuals, best)
+        widest, further = rank_measurements(residuals, best)
     value, slope = responses.at(best)
     m = len(targets.numbers)
     return Fit(
@@ -166,6 +166,7 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         slope[:m],
         replace(known, rises=rises),
         ends,
+        widest,
         further,
         done,
         responses.directions,

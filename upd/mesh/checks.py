@@ -288,32 +288,6 @@ def _normal(one: FloatArray, two: FloatArray) -> FloatArray:
 # -- shape -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Quality:
-    """Shape of a mesh's hexahedra.
-
-    Attributes
-    ----------
-    min, mean
-        Scaled Jacobian; 1 for a brick, <= 0 for an inverted element.
-    worst
-        Number of the element with the smallest one.
-    n_negative
-        Elements with a scaled Jacobian <= 0.
-    aspect
-        Largest ratio of longest to shortest edge in one element.
-    longest
-        Number of the element with that ratio.
-    """
-
-    min: float
-    mean: float
-    worst: int
-    n_negative: int
-    aspect: float
-    longest: int
-
-
 def _determinant(axes: FloatArray) -> FloatArray:
     """Determinant of (..., 3, 3) unit row vectors; 0 where a row has no length."""
     length = np.linalg.norm(axes, axis=-1, keepdims=True)
@@ -328,8 +302,9 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
     """Scaled Jacobian of every hexahedron, (n_hex,).
 
     Least determinant of the unit edge vectors over the 8 corners and of the unit principal axes at
-    the centre (Verdict Library Reference Manual, SAND2007-1751, 6.16). Edges of 20- and 27-node
-    elements are taken where they leave the corner, so that a bent edge counts.
+    the centre; 1 for a brick, <= 0 for an inverted element (Verdict Library Reference Manual,
+    SAND2007-1751, 6.16). Edges of 20- and 27-node elements are taken where they leave the corner,
+    so that a bent edge counts.
     """
     corner = mesh.points[mesh.hexes[:, :8]]
     edges = corner[:, _NEIGHBOURS] - corner[:, :, None, :]
@@ -343,23 +318,12 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
     return least
 
 
-def quality(mesh: Mesh) -> Quality:
-    """Least and mean scaled Jacobian, the worst element, how many are inverted, and the largest
-    edge ratio.
-    """
-    jacobian, corner = scaled_jacobian(mesh), mesh.points[mesh.hexes[:, :8]]
-    # longest over shortest edge between corners
+def edge_ratio(mesh: Mesh) -> FloatArray:
+    """Longest over shortest edge (between corners) of every hexahedron, (n_hex,)."""
+    corner = mesh.points[mesh.hexes[:, :8]]
     length = np.linalg.norm(corner[:, EDGES[:, 1]] - corner[:, EDGES[:, 0]], axis=2)
     shortest = length.min(axis=1)
-    ratio = np.divide(
+    ratio: FloatArray = np.divide(
         length.max(axis=1), shortest, out=np.full(len(length), np.inf), where=shortest > 0.0
     )
-    worst, longest = int(jacobian.argmin()), int(ratio.argmax())
-    return Quality(
-        min=float(jacobian[worst]),
-        mean=float(jacobian.mean()),
-        worst=worst,
-        n_negative=int(np.count_nonzero(jacobian <= 0.0)),
-        aspect=float(ratio[longest]),
-        longest=longest,
-    )
+    return ratio

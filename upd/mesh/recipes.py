@@ -22,7 +22,7 @@ from upd.cache.arrays import cache_folder, load_arrays, save_arrays, unreadable
 from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError, did_you_mean
 from upd.mesh import FloatArray
-from upd.mesh.checks import check_mesh, check_pairs, quality
+from upd.mesh.checks import check_mesh, check_pairs, scaled_jacobian
 from upd.mesh.fields import DamperSizes
 from upd.mesh.hexmesh import Mesh
 from upd.mesh.recipe_modules import geometry_module, is_file, is_mesh, line_of, module_of
@@ -367,13 +367,14 @@ def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
     for name, mesh in meshes.items():
         if is_file(recipe):
             check_mesh(name, mesh)
-        found = quality(mesh)
-        if not found.min > LEAST_JACOBIAN:
-            x, y, z = mesh.points[mesh.hexes[found.worst]].mean(axis=0)
+        jacobian = scaled_jacobian(mesh)
+        worst = int(jacobian.argmin())
+        if not jacobian[worst] > LEAST_JACOBIAN:
+            x, y, z = mesh.points[mesh.hexes[worst]].mean(axis=0)
             raise MeshError(
-                f"{name}: hexahedron {found.worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm "
-                f"has the scaled Jacobian {found.min:.3g}, "
-                f"more than {LEAST_JACOBIAN:g} is needed ({found.n_negative} of "
+                f"{name}: hexahedron {worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm "
+                f"has the scaled Jacobian {jacobian[worst]:.3g}, "
+                f"more than {LEAST_JACOBIAN:g} is needed ({int((jacobian <= 0.0).sum())} of "
                 f"{mesh.n_hex} are inverted): "
                 + (
                     "mesh it anew there, with nodes in the file's order of corners"

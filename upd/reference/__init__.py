@@ -30,7 +30,6 @@ from upd.reference.half_space import love_rectangle_stress as love_rectangle_str
 from upd.reference.half_space import pressure_shift_rectangle as pressure_shift_rectangle
 from upd.reference.half_space import von_mises as von_mises
 from upd.reference.hertz import HertzPoint as HertzPoint
-from upd.reference.hertz import YieldPoint as YieldPoint
 from upd.reference.hertz import contact_modulus as contact_modulus
 from upd.reference.hertz import dundurs_beta as dundurs_beta
 from upd.reference.hertz import hertz_axial_displacement as hertz_axial_displacement
@@ -54,7 +53,6 @@ from upd.reference.printed import THESIS_FREQUENCIES as THESIS_FREQUENCIES
 from upd.reference.printed import THESIS_HERTZ as THESIS_HERTZ
 from upd.reference.printed import THESIS_STEEL as THESIS_STEEL
 from upd.reference.printed import THESIS_STIFFNESS as THESIS_STIFFNESS
-from upd.reference.printed import Printed as Printed
 from upd.reference.printed import printed_values as printed_values
 
 mindlin_cycle_energy = mindlin.cycle_energy

@@ -419,22 +419,6 @@ def punch_pressure(r: Real, a: float, load: float) -> Real:
 # -- onset of yield --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class YieldPoint:
-    """Where a body under a Hertz contact is stressed most.
-
-    Attributes
-    ----------
-    ratio
-        Largest von Mises stress over the largest pressure p0.
-    depth
-        Of that place over the contact radius: on the axis, or 0 at the contact's edge.
-    """
-
-    ratio: float
-    depth: float
-
-
 def hertz_axis_stress(z: Real, a: float, p0: float, nu: float) -> tuple[Real, Real]:
     """Stresses on the axis of a Hertz contact: s_r = s_theta, and s_z.
 
@@ -470,7 +454,7 @@ def hertz_axis_stress(z: Real, a: float, p0: float, nu: float) -> tuple[Real, Re
     return plain(p0 * radial), plain(-p0 * fading)
 
 
-def hertz_yield_point(nu: float) -> YieldPoint:
+def hertz_yield_point(nu: float) -> tuple[float, float]:
     """The most stressed place under a Hertz contact.
 
     On the axis the von Mises stress is abs(s_r - s_z); at the contact's edge the surface is in pure
@@ -484,7 +468,10 @@ def hertz_yield_point(nu: float) -> YieldPoint:
 
     Returns
     -------
-    YieldPoint
+    ratio : float
+        Von Mises stress there over the largest pressure.
+    depth : float
+        Over the contact radius; 0 at the surface.
 
     References
     ----------
@@ -494,8 +481,8 @@ def hertz_yield_point(nu: float) -> YieldPoint:
     Examples
     --------
     >>> from upd.reference import hertz_yield_point
-    >>> found = hertz_yield_point(0.3)
-    >>> print(f"p0 = {1.0 / found.ratio:.3f} Y at {found.depth:.3f} a")
+    >>> ratio, depth = hertz_yield_point(0.3)
+    >>> print(f"p0 = {1.0 / ratio:.3f} Y at {depth:.3f} a")
     p0 = 1.613 Y at 0.481 a
     """
     elastic("hertz_yield_point", 1.0, nu)
@@ -507,11 +494,11 @@ def hertz_yield_point(nu: float) -> YieldPoint:
     # s_r - s_z rises from (1 - 2 nu) / 2 to one top and falls to zero from there
     top = minimize_scalar(lambda t: -difference(t), bounds=(0.0, 2.0), method="bounded")
     places = [
-        YieldPoint(difference(float(top.x)), float(top.x)),
-        YieldPoint(abs(1.0 - 2.0 * nu) / 2.0, 0.0),
-        YieldPoint(abs(1.0 - 2.0 * nu) / np.sqrt(3.0), 0.0),
+        (difference(float(top.x)), float(top.x)),
+        (abs(1.0 - 2.0 * nu) / 2.0, 0.0),
+        (abs(1.0 - 2.0 * nu) / np.sqrt(3.0), 0.0),
     ]
-    return max(places, key=lambda place: place.ratio)
+    return max(places, key=lambda place: place[0])
 
 
 def hertz_yield_load(yield_stress: float, nu: float, radius: float, E_star: float) -> float:
@@ -549,7 +536,7 @@ def hertz_yield_load(yield_stress: float, nu: float, radius: float, E_star: floa
     262 N
     """
     positive("hertz_yield_load", yield_stress=yield_stress)
-    p0 = yield_stress / hertz_yield_point(nu).ratio
+    p0 = yield_stress / hertz_yield_point(nu)[0]
     return float((p0 / hertz_sphere(1.0, radius, E_star).max_pressure) ** 3)
 
 
