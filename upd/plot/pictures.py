@@ -91,10 +91,8 @@ def _together(meshes: Mapping[str, Mesh]) -> tuple[FloatArray, IntArray, IntArra
     """
     points = np.vstack([mesh.points for mesh in meshes.values()])
     first = np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])])
-    quads = [
-        boundary_faces(mesh)[:, :4] + start
-        for mesh, start in zip(meshes.values(), first, strict=False)
-    ]
+    pairs = zip(meshes.values(), first, strict=False)
+    quads = [boundary_faces(mesh)[:, :4] + start for mesh, start in pairs]
     return points, np.vstack(quads), np.repeat(np.arange(len(quads)), [len(q) for q in quads])
 
 
