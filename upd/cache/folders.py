@@ -57,22 +57,22 @@ class OwnFolder:
         UpdError
             When no name can be taken: the files are then where the message names.
         """
-        wanted = self.place
         try:
             with _turn(self.path.parent):
                 _replace(self.path, self.place.resolve(), self._ours)
         except OSError as error:
-            self.place = next(place for place in numbered(self.place) if not place.exists())
+            free = next(place for place in numbered(self.place) if not place.exists())
             with suppress(OSError):
-                shutil.move(self.path, self.place)
-                return self.place
+                shutil.move(self.path, free)
+                self.place = free
+                return free
             kept = self.path.with_name(self.path.name.lstrip("."))
             with suppress(OSError):
                 # Under a name that no later call takes for what a killed process left.
                 self.path.rename(kept)
             raise UpdError(
-                f"{wanted} cannot be written any more ({error.strerror or error}): the files are "
-                f"in {kept if kept.exists() else self.path}; move them to where they can stay"
+                f"{self.place} cannot be written any more ({error.strerror or error}): the files "
+                f"are in {kept if kept.exists() else self.path}; move them to where they can stay"
             ) from None
         finally:
             self._release()
