@@ -134,7 +134,7 @@ def grid_scene(found: BestDamper) -> ForcedScene:
         With the ranges.
     """
     c = found.best.best.log_centrifugal
-    deciding = [math.exp(c - p.s) for p in found.best.best.deciding]
+    deciding = [math.exp(c - s) for s, *_ in found.best.best.deciding]
     low, high = found.ranges.forces
     shapes = zip(found.ranges.shapes, found.best.values, strict=True)
     forces = [low, high, *(f for f in deciding if low * 1.001 < f < high / 1.001)]

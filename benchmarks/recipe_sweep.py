@@ -18,7 +18,7 @@ import numpy as np
 from upd.errors import InputError, MeshError
 from upd.fem import Material, mass_properties
 from upd.mesh import Mesh
-from upd.mesh.checks import check_pairs, quality
+from upd.mesh.checks import check_pairs, scaled_jacobian
 from upd.mesh.recipes import LEAST_JACOBIAN, parameters
 
 UNIT = Material(E=1.0, nu=0.3, rho=1.0)
@@ -162,10 +162,10 @@ def _refusal(recipe: str, told: str) -> str:
 def _problems(
     recipe: str, params: Any, body: str, mesh: Mesh, counted: Mapping[str, int]
 ) -> Iterator[str]:
-    shape = quality(mesh)
-    if not shape.min > LEAST_JACOBIAN:
-        x, y, z = mesh.points[mesh.hexes[shape.worst]].mean(axis=0)
-        yield f"scaled Jacobian {shape.min:.3g} at ({x:.4g}, {y:.4g}, {z:.4g})"
+    shape = scaled_jacobian(mesh)
+    if not shape.min() > LEAST_JACOBIAN:
+        x, y, z = mesh.points[mesh.hexes[shape.argmin()]].mean(axis=0)
+        yield f"scaled Jacobian {shape.min():.3g} at ({x:.4g}, {y:.4g}, {z:.4g})"
     if (counted["nodes"], counted["hexes"]) != (mesh.n_node, mesh.n_hex):
         yield f"counted {dict(counted)}, made {mesh.n_node} nodes, {mesh.n_hex} hexahedra"
     if not np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)):

@@ -92,7 +92,7 @@ def solved(*values: float) -> list[SolvedVariation]:
 
 def test_a_number_gets_the_part_of_its_companions() -> None:
     levels = solved(*(100.0 + 5.0 * SIZES[1:] ** 2))
-    found = source_estimates("mesh", SOLVED, levels, lambda order: 10.0 * order)
+    found = source_estimates("mesh", SOLVED, levels, lambda order: (10.0 * order, ""))
     (part,) = found["K_N", NUMBER.case]
     assert part.source == "mesh"
     assert part.error == pytest.approx(1.25 * 5.0 / 105.0, rel=1e-6)
@@ -116,7 +116,7 @@ def test_a_half_out_of_reach_says_why() -> None:
 def test_what_no_companion_shows_is_not_called_small() -> None:
     """Rule: a number whose error was not found has no error, and says why."""
     lost = SolvedVariation(Variation("mesh", "8 x 8"), reason="8 x 8: too coarse")
-    found = source_estimates("mesh", SOLVED, [lost], lambda order: 1.0)
+    found = source_estimates("mesh", SOLVED, [lost], lambda order: (1.0, ""))
     (part,) = found["K_N", NUMBER.case]
     assert not part.known
     assert part.basis == "8 x 8: too coarse"
@@ -144,7 +144,7 @@ def test_parts_add_up_and_the_largest_tells_the_cost() -> None:
 def test_what_has_no_sign_has_no_relative_error(value: float, other: float, why: str) -> None:
     run = SolvedVariation(RUN, [replace(NUMBER, value=value)])
     levels = solved(other)
-    (part,) = source_estimates("mesh", run, levels, lambda _: 7.0)["K_N", NUMBER.case]
+    (part,) = source_estimates("mesh", run, levels, lambda _: (7.0, ""))["K_N", NUMBER.case]
     assert not part.known
     assert why in part.basis
 

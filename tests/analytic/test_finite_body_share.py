@@ -35,7 +35,7 @@ def test_share_is_that_of_a_solve_for_the_difference_of_the_fields() -> None:
     from scipy.sparse.linalg import spsolve
 
     from upd.fem.elements import gauss
-    from upd.mesh.hexmesh import boundary_quads
+    from upd.mesh.hexmesh import boundary_faces
 
     solution = solved(1.6)
     model, (case,) = solution.model, solution.normal
@@ -44,7 +44,7 @@ def test_share_is_that_of_a_solve_for_the_difference_of_the_fields() -> None:
     x = body.mesh.points * into
     x[:, 2] = np.maximum(x[:, 2], 0.0)
     assert patch.mirrored == (True, True)
-    distant, quads = body.mesh.nodes["distant"], boundary_quads(body.mesh)
+    distant, quads = body.mesh.nodes["distant"], boundary_faces(body.mesh)[:, :4]
     cut = (np.abs(x[quads][:, :, :2]) < 1e-8).all(axis=1).any(axis=1)
     inside = np.linalg.norm(x[quads].mean(axis=1), axis=1) <= radius
     faces = quads[~(np.isin(quads, distant).all(axis=1) | cut | inside)]

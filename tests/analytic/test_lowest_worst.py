@@ -77,7 +77,7 @@ def test_the_best_damper_over_a_range_of_forces() -> None:
     found = lowest_worst(worst, 2.2, 5.0)
     assert math.exp(found.log_centrifugal) == pytest.approx(exact.x, rel=2e-3)
     assert math.exp(found.log_worst) == pytest.approx(exact.fun, rel=2e-3)
-    told = sorted(math.exp(found.log_centrifugal - p.s) for p in found.deciding)
+    told = sorted(math.exp(found.log_centrifugal - s) for s, *_ in found.deciding)
     assert told == pytest.approx(forces, rel=1e-5)
     c, limit = found.log_centrifugal, found.log_worst + math.log(1.05)
     for bound in (2.2, 5.0):

@@ -147,9 +147,6 @@ def test_sphere_gap_near_and_far_from_the_axis():
 
 def test_moduli_and_radii():
     assert ref.contact_modulus(E, NU, np.inf, NU) == pytest.approx(2 * E_STAR, rel=4 * EPS)
-    assert ref.effective_radius(R) == pytest.approx(R, rel=4 * EPS)
-    assert ref.effective_radius(R, R) == pytest.approx(R / 2, rel=4 * EPS)
-    assert ref.effective_radius(5.0, -10.0) == pytest.approx(10.0, rel=4 * EPS)
 
 
 @given(
@@ -163,8 +160,7 @@ def test_dundurs_in_kolosov_form(E1, nu1, E2, nu2):
     G1, G2 = E1 / (2 * (1 + nu1)), E2 / (2 * (1 + nu2))
     k1, k2 = 3 - 4 * nu1, 3 - 4 * nu2
     below = G1 * (k2 + 1) + G2 * (k1 + 1)
-    alpha, beta = (G1 * (k2 + 1) - G2 * (k1 + 1)) / below, (G1 * (k2 - 1) - G2 * (k1 - 1)) / below
-    assert ref.dundurs_alpha(E1, nu1, E2, nu2) == pytest.approx(-alpha, abs=40 * EPS)
+    beta = (G1 * (k2 - 1) - G2 * (k1 - 1)) / below
     assert ref.dundurs_beta(E1, nu1, E2, nu2) == pytest.approx(-beta, abs=40 * EPS)
     assert ref.dundurs_beta(E2, nu2, E1, nu1) == pytest.approx(beta, abs=40 * EPS)
     assert ref.dundurs_beta(E1, nu1, E1, nu1) == 0
@@ -202,8 +198,6 @@ def test_punch():
         (lambda: ref.contact_modulus(E, 0.6, E, NU), "Poisson"),
         (lambda: ref.contact_modulus(np.inf, NU, np.inf, NU), "rigid"),
         (lambda: ref.contact_modulus(-np.inf, NU, E, NU), "E ="),
-        (lambda: ref.effective_radius(5.0, -5.0), "diverge"),
-        (lambda: ref.effective_radius(0.0), "zero"),
         (lambda: ref.punch_pressure(1.0, 1.0, 1.0), "edge"),
         (lambda: ref.dundurs_beta(0.0, NU, E, NU), "E ="),
     ],

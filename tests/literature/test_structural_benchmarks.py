@@ -214,7 +214,7 @@ def stress_yy(mesh, material, u, point):
     X = X[:, np.flatnonzero(mesh.hexes[k, :8] == node)]
     inverse = maker.mapping(slice(k, k + 1)).jacobian(X).inverse[:, :, 0, 0]
     gradient = np.einsum(
-        "aj,ji,ac->ci", maker.element.gradients_at(X)[:, :, 0], inverse, u[maker.nodes[k]]
+        "aj,ji,ac->ci", maker.element.shapes_at(X)[1][:, :, 0], inverse, u[maker.nodes[k]]
     )
     return material.lam * np.trace(gradient) + 2 * material.mu * gradient[1, 1]
 

@@ -508,13 +508,13 @@ def with_printed(results: Iterable[Result], printed: Lookup) -> list[Result]:
     printed
         Printed values of the scene, from `printed_of`.
     """
-    out = []
-    for one in results:
+    out = list(results)
+    for k, one in enumerate(out):
         found = printed(one.name, one.case.given())
         # Several values have no order that could be the run's.
-        if len(found) == 1 and one.reference is None:
-            one = replace(one, reference=found[0].value, source=found[0].source, exact=False)
-        elif len(found) == 1 and one.reference is not None:
-            one = replace(one, printed_error=found[0].value / one.reference - 1.0)
-        out.append(one)
+        for value, source in found if len(found) == 1 else ():
+            if one.reference is None:
+                out[k] = replace(one, reference=value, source=source, exact=False)
+            else:
+                out[k] = replace(one, printed_error=value / one.reference - 1.0)
     return out

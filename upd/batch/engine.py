@@ -65,46 +65,25 @@ _LOST = "the connection to the cluster's scheduler was lost"
 _AGAIN = ", then the same command; it takes up where it stood"
 
 
-class InProcess:
-    """This process itself, one point at a time.
-
-    Attributes
-    ----------
-    deaths
-        What the future of a task raises whose worker died.
-    """
-
-    deaths: tuple[type[BaseException], ...] = ()
-
-    def workers(self) -> Sequence[str]:
-        """Names of the workers there are. Raises UpdError when none will come."""
-        return ["here"]
-
-    def submit(self, worker: str, task: str) -> Future[str]:
-        """Let a worker that has nothing to do solve the task: the future of its JSON outcome."""
-        future = Future[str]()
-        future.set_result(solve_task(task))
-        return future
-
-    def close(self) -> None:
-        """End the workers, at once."""
-        forget()
-
-
 class Processes:
-    """Processes of this machine, started (spawn) when first needed.
+    """Processes of this machine, started (spawn) when first needed, or this one itself.
 
     Each is a pool of its own, so that one that dies takes no other along.
 
     Parameters
     ----------
     count
-        Processes side by side.
+        Processes side by side; 0: this process, one point at a time.
     threads
         Threads of each; 0: as many as the libraries take by themselves.
     fresh
         A new process for every point: nothing an earlier one left counts in its memory, nor
         shortens its time.
+
+    Attributes
+    ----------
+    deaths
+        What the future of a task raises whose worker died.
     """
 
     deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
@@ -116,9 +95,15 @@ class Processes:
         self._pools: dict[str, tuple[ProcessPoolExecutor, Future[int]]] = {}
 
     def workers(self) -> Sequence[str]:
-        return self._names
+        """Names of the workers there are. Raises UpdError when none will come."""
+        return self._names or ["here"]
 
     def submit(self, worker: str, task: str) -> Future[str]:
+        """Let a worker that has nothing to do solve the task: the future of its JSON outcome."""
+        if not self._names:
+            future = Future[str]()
+            future.set_result(solve_task(task))
+            return future
         if self._fresh:
             self._end(worker)
         # Its process may have died while idle.
@@ -133,6 +118,9 @@ class Processes:
         return pool.submit(solve_task, task)
 
     def close(self) -> None:
+        """End the workers, at once."""
+        if not self._names:
+            forget()
         for worker in list(self._pools):
             self._end(worker)
 
@@ -198,7 +186,12 @@ class DaskCluster:
         check_address(address)
         dask = importlib.import_module("distributed")
         self.deaths: tuple[type[BaseException], ...] = (dask.KilledWorker, CancelledError, OSError)
-        self._patience, self._levels = PATIENCE_S, _quiet()
+        self._patience = PATIENCE_S
+        # Dask's loggers are silent: what goes wrong is reported once, by an error of ours.
+        known = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+        self._levels = {logger: logger.level for logger in map(logging.getLogger, known)}
+        for logger in self._levels:
+            logger.setLevel(logging.CRITICAL + 1)
         self._executors: dict[str, Any] = {}
         self._known: tuple[float, list[str]] = (-_LOOK_S, [])
         self._seen = time.monotonic()
@@ -263,20 +256,7 @@ class DaskCluster:
 
 
 #: who solves points: names of workers, `submit`, `close`
-Executor = InProcess | Processes | DaskCluster
-
-
-def _quiet() -> dict[logging.Logger, int]:
-    """Dask's loggers silenced, and their levels before.
-
-    What goes wrong is reported once, by an error of ours.
-    """
-    known = list(logging.root.manager.loggerDict)
-    loggers = [logging.getLogger(name) for name in known if name.startswith("distributed")]
-    levels = {logger: logger.level for logger in loggers}
-    for logger in levels:
-        logger.setLevel(logging.CRITICAL + 1)
-    return levels
+Executor = Processes | DaskCluster
 
 
 def check_address(address: str) -> None:
@@ -323,8 +303,6 @@ class Workers:
         """The workers, not yet started. Raises InputError when there is no such cluster."""
         if self.cluster:
             return DaskCluster(self.cluster)
-        if self.count == 0:
-            return InProcess()
         return Processes(self.count, self.threads, fresh=self.fresh)
 
 
@@ -596,9 +574,9 @@ def dispatch(
             if future not in done and worker in there:
                 continue
             del running[future]
-            text = _text(future, executor) if future in done else None
-            if text is not None:
-                record(number, _checked(read_outcome(text)))
+            outcome = _outcome(future, executor) if future in done else None
+            if outcome is not None:
+                record(number, outcome)
                 continue
             future.cancel()
             deaths[number] += 1
@@ -608,10 +586,10 @@ def dispatch(
                 record(number, Outcome(failure=_KILLED.format(deaths[number]), final=False))
 
 
-def _text(future: Future[str], executor: Executor) -> str | None:
-    """The outcome as JSON; None where the worker died."""
+def _outcome(future: Future[str], executor: Executor) -> Outcome | None:
+    """Of a task; None where the worker died."""
     try:
-        return future.result()
+        text = future.result()
     except executor.deaths:
         return None
     except Exception as error:
@@ -619,9 +597,7 @@ def _text(future: Future[str], executor: Executor) -> str | None:
             f"a worker cannot run points ({type(error).__name__}: {error}): install the same upd "
             "there as here"
         ) from error
-
-
-def _checked(outcome: Outcome) -> Outcome:
+    outcome = read_outcome(text)
     if outcome.failure.startswith(OTHER_CODE):
         raise InputError(
             f"{outcome.failure}: install the same there, or numbers of one table would "

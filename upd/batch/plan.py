@@ -99,7 +99,9 @@ def _axis(text: str, scene: Mapping[str, Any]) -> Parameter:
         raise InputError(f"--vary {text!r}: {_FORMS}")
     parts = [part.strip() for part in given.split(":")]
     ends = [end for end in map(number_and_unit, parts[:2]) if end is not None]
-    now = _entry(scene, path)
+    now: Any = scene
+    for key in path.split("."):
+        now = now.get(key) if isinstance(now, Mapping) else None
     wrapped = isinstance(now, list)
     mine = number_and_unit(str(now[0] if wrapped and now else now))
     own = "" if mine is None else mine[1]
@@ -145,13 +147,6 @@ def _range(
 def _with_unit(value: Any, unit: str) -> Any:
     plain = isinstance(value, (int, float)) and not isinstance(value, bool)
     return f"{value!r} {unit}" if plain and unit else value
-
-
-def _entry(scene: Mapping[str, Any], path: str) -> Any:
-    node: Any = scene
-    for key in path.split("."):
-        node = node.get(key) if isinstance(node, Mapping) else None
-    return node
 
 
 # -- a sample of a scene's uncertain inputs --------------------------------------------------------
@@ -220,28 +215,24 @@ def draw_sample(scene: AnyScene, count: int, seed: int) -> Sample:
     return Sample(seed, inputs, np.vstack([np.zeros(len(inputs)), 2.0 * drawn - 1.0]))
 
 
-def sample_axes(sample: Sample) -> tuple[Parameter, ...]:
-    """A parameter for every input, with its values at all points in the unit inside."""
-    out = []
+def sample_points(scene: AnyScene, sample: Sample) -> tuple[tuple[Parameter, ...], list[str]]:
+    """A parameter for every input, with its values at all points in the unit inside; the scenes of
+    all points as TOML: first as given with its half-widths, whose run gives the first-order bands,
+    then with the values drawn alone.
+    """
+    axes = []
     for one, shifts in zip(sample.inputs, sample.shifts.T, strict=True):
         unit = unit_inside(one.kind)
         numbers = tuple(float(one.value + shift * one.half_width) for shift in shifts)
         values = tuple(f"{number!r} {unit}" for number in numbers) if unit else numbers
-        out.append(Parameter(one.path, values))
-    return tuple(out)
-
-
-def sample_texts(scene: AnyScene, sample: Sample, axes: Sequence[Parameter]) -> list[str]:
-    """The scenes of all points as TOML: first as given with its half-widths, whose run gives the
-    first-order bands; then with the values drawn alone.
-    """
-    out = []
+        axes.append(Parameter(one.path, values))
+    texts = []
     for k in range(len(sample.shifts)):
         data = tomllib.loads(scene.text)
         for one, axis in zip(sample.inputs, axes, strict=True):
             data = put_back(data, one.steps, axis.values[k] if k else one.given)
-        out.append(tomli_w.dumps(data))
-    return out
+        texts.append(tomli_w.dumps(data))
+    return tuple(axes), texts
 
 
 # -- the plan --------------------------------------------------------------------------------------
@@ -349,10 +340,10 @@ def plan_sweep(
         grid = tuple(places(axes))
         points = [(scene.text, settings(axes, place)) for place in grid]
     else:
-        axes = sample_axes(drawn)
+        axes, texts = sample_points(scene, drawn)
         # the k-th value of every input together, point by point
         grid = tuple((k,) * len(axes) for k in range(len(drawn.shifts)))
-        points = [(text, {}) for text in sample_texts(scene, drawn, axes)]
+        points = [(text, {}) for text in texts]
     code = source_digest(scene.recipe)
     limit = cache_limit()
     tasks = tuple(

@@ -15,7 +15,7 @@ import tomllib
 import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +103,8 @@ def solve_task(text: str) -> str:
     with _turn:
         if task.code and task.code != source_digest(task.recipe):
             return Outcome(failure=f"{OTHER_CODE} on {socket.gethostname()}", final=False).text()
-        return _solved(task).text()
+        here = f"{socket.gethostname()}:{os.getpid()}"
+        return replace(_solved(task), where=here).text()
 
 
 def forget() -> None:
@@ -164,7 +165,7 @@ def _failed(error: Exception, seconds: float) -> Outcome:
         log.exception("point failed")
         last = traceback.extract_tb(error.__traceback__)[-1]
         known += f" ({Path(last.filename).name}, line {last.lineno})"
-    return Outcome(failure=" ".join(known.split()), final=final, seconds=seconds, where=_where())
+    return Outcome(failure=" ".join(known.split()), final=final, seconds=seconds)
 
 
 def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
@@ -183,9 +184,4 @@ def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
             ),
         ),
         shared=shared,
-        where=_where(),
     )
-
-
-def _where() -> str:
-    return f"{socket.gethostname()}:{os.getpid()}"

@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,14 +62,27 @@ class PointStore:
 
     def check(self) -> None:
         """Raise InputError where the folder cannot be written, or has other things in it."""
-        self._check_ours()
+        there = set[str]()
+        with suppress(OSError):
+            # Missing, or a file: whoever writes into it reports that.
+            there = {entry.name for entry in self.folder.iterdir()}
+        # Points alone were copied there to keep what is solved.
+        if there and there != {"points"} and not there & _OURS:
+            raise InputError(
+                f"the folder {self.folder} is not empty and holds no {self.what}: choose another "
+                "with --out, or empty it"
+            )
+        if self.what == "study" and there & {GRID, "sweep.json"}:
+            raise InputError(
+                f"the folder {self.folder} holds a sweep: choose another with --out for the study"
+            )
         try:
             places = (self.folder.resolve(), *self.folder.resolve().parents)
         except RuntimeError:
             raise self._refused("its links lead in a circle") from None
-        there = next(place for place in places if place.exists())
-        if not there.is_dir() or not os.access(there, os.W_OK):
-            raise self._refused(f"{there}: no folder, or no permission")
+        place = next(place for place in places if place.exists())
+        if not place.is_dir() or not os.access(place, os.W_OK):
+            raise self._refused(f"{place}: no folder, or no permission")
 
     @contextmanager
     def sole(self) -> Iterator[None]:
@@ -122,9 +135,14 @@ class PointStore:
         except (OSError, ValueError):
             earlier = grid
         if earlier != grid:
+            axes = (f"{one['path']}={','.join(map(str, one['values']))}" for one in earlier["axes"])
+            what, drawn = " and ".join(axes), earlier.get("sample")
+            if drawn:
+                what = f"a sample of {drawn['count']} with seed {drawn['seed']}"
             differs = "" if earlier["axes"] != grid["axes"] else ", of a scene with other values"
             raise InputError(
-                f"the sweep folder {self.folder} holds another sweep ({_shown(earlier)}{differs}): "
+                f"the sweep folder {self.folder} holds another sweep "
+                f"({earlier['scene']}, {what}{differs}): "
                 "choose another folder with --out (copy its points/ there to keep what is solved), "
                 "or delete it"
             )
@@ -138,37 +156,11 @@ class PointStore:
         except (OSError, ValueError, TypeError, KeyError):
             return 0
 
-    def _check_ours(self) -> None:
-        try:
-            there = {entry.name for entry in self.folder.iterdir()}
-        except OSError:
-            # Missing, or a file: whoever writes into it reports that.
-            return
-        # Points alone were copied there to keep what is solved.
-        if there and there != {"points"} and not there & _OURS:
-            raise InputError(
-                f"the folder {self.folder} is not empty and holds no {self.what}: choose another "
-                "with --out, or empty it"
-            )
-        if self.what == "study" and there & {GRID, "sweep.json"}:
-            raise InputError(
-                f"the folder {self.folder} holds a sweep: choose another with --out for the study"
-            )
-
     def _refused(self, why: str | None) -> InputError:
         return InputError(
             f"the {self.what} folder {self.folder} cannot be written ({why}): choose another with "
             "--out"
         )
-
-
-def _shown(grid: Mapping[str, Any]) -> str:
-    """A grid in words."""
-    if grid.get("sample"):
-        drawn = grid["sample"]
-        return f"{grid['scene']}, a sample of {drawn['count']} with seed {drawn['seed']}"
-    axes = (f"{axis['path']}={','.join(map(str, axis['values']))}" for axis in grid["axes"])
-    return f"{grid['scene']}, {' and '.join(axes)}"
 
 
 def _digest(data: Mapping[str, Any]) -> str:

@@ -274,7 +274,13 @@ def _arrays(result: SweepResult) -> dict[str, Any]:
     for name, axis in zip(names, axes, strict=True):
         notes = {"long_name": axis.path, **({"units": axis.unit} if axis.unit else {})}
         along = (name,) if plan.sample is None else dims
-        out[name] = (along, *_coordinate(axis, notes))
+        if axis.numbers is None:
+            # words as numbers with their meanings (CF conventions)
+            codes = np.arange(len(axis.values), dtype=np.int32)
+            words = " ".join(str(value).replace(" ", "_") for value in axis.values)
+            out[name] = (along, codes, notes | {"flag_values": codes, "flag_meanings": words})
+        else:
+            out[name] = (along, np.array(axis.numbers, float), notes)
     for column in result.columns:
         notes = {"long_name": column.title, "units": column.unit or "1"}
         out[_free(file_name(column.title), out)] = (dims, column.values.reshape(shape), notes)
@@ -284,17 +290,6 @@ def _arrays(result: SweepResult) -> dict[str, Any]:
     seconds = np.array([outcome.seconds for outcome in result.outcomes])
     out["seconds"] = (dims, seconds.reshape(shape), {"units": "s"})
     return out
-
-
-def _coordinate(axis: Parameter, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and
-    flag_meanings).
-    """
-    if axis.numbers is not None:
-        return np.array(axis.numbers, float), notes
-    codes = np.arange(len(axis.values), dtype=np.int32)
-    words = [str(value).replace(" ", "_") for value in axis.values]
-    return codes, notes | {"flag_values": codes, "flag_meanings": " ".join(words)}
 
 
 def _free(name: str, taken: dict[str, Any]) -> str:

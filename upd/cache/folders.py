@@ -61,7 +61,19 @@ class OwnFolder:
             with _turn(self.path.parent):
                 _replace(self.path, self.place.resolve(), self._ours)
         except OSError as error:
-            self.place = self._next_to(error)
+            free = next(place for place in numbered(self.place) if not place.exists())
+            with suppress(OSError):
+                shutil.move(self.path, free)
+                self.place = free
+                return free
+            kept = self.path.with_name(self.path.name.lstrip("."))
+            with suppress(OSError):
+                # Under a name that no later call takes for what a killed process left.
+                self.path.rename(kept)
+            raise UpdError(
+                f"{self.place} cannot be written any more ({error.strerror or error}): the files "
+                f"are in {kept if kept.exists() else self.path}; move them to where they can stay"
+            ) from None
         finally:
             self._release()
         return self.place
@@ -82,20 +94,6 @@ class OwnFolder:
         """Remove the folder: nothing takes its place."""
         shutil.rmtree(self.path, ignore_errors=True)
         self._release()
-
-    def _next_to(self, error: OSError) -> Path:
-        candidate = next(place for place in numbered(self.place) if not place.exists())
-        with suppress(OSError):
-            shutil.move(self.path, candidate)
-            return candidate
-        kept = self.path.with_name(self.path.name.lstrip("."))
-        with suppress(OSError):
-            # Under a name that no later call takes for what a killed process left.
-            self.path.rename(kept)
-        raise UpdError(
-            f"{self.place} cannot be written any more ({error.strerror or error}): the files are "
-            f"in {kept if kept.exists() else self.path}; move them to where they can stay"
-        ) from None
 
     def _release(self) -> None:
         if self._lock is not None:
@@ -228,7 +226,18 @@ def _replace(part: Path, place: Path, ours: Ours) -> None:
     there = list(place.iterdir()) if place.is_dir() else []
     here = place in (Path.cwd(), *Path.cwd().parents)
     if inside or here or not all(map(ours, there)):
-        _move_files(part, place, ours)
+        new = sorted(part.iterdir(), key=lambda entry: (entry.name == "summary.json", entry.name))
+        taken = [e.name for e in new if (place / e.name).exists() and not ours(place / e.name)]
+        if taken:
+            raise FileExistsError(errno.EEXIST, f"{', '.join(taken)} in it is not ours")
+        for entry in place.iterdir():
+            if entry != part and ours(entry):
+                shutil.rmtree(
+                    entry
+                ) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
+        for entry in new:
+            entry.rename(place / entry.name)
+        part.rmdir()
         return
     if not there:
         # An empty folder is replaced, a missing one made.
@@ -243,16 +252,3 @@ def _replace(part: Path, place: Path, ours: Ours) -> None:
         old.rename(place)
         raise
     shutil.rmtree(old, ignore_errors=True)
-
-
-def _move_files(part: Path, place: Path, ours: Ours) -> None:
-    new = sorted(part.iterdir(), key=lambda entry: (entry.name == "summary.json", entry.name))
-    taken = [e.name for e in new if (place / e.name).exists() and not ours(place / e.name)]
-    if taken:
-        raise FileExistsError(errno.EEXIST, f"{', '.join(taken)} in it is not ours")
-    for entry in place.iterdir():
-        if entry != part and ours(entry):
-            shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
-    for entry in new:
-        entry.rename(place / entry.name)
-    part.rmdir()

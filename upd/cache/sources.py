@@ -10,7 +10,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -21,30 +21,28 @@ from typing import Any
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "pyamg", "numba", "pypardiso", "mkl")
 #: folders in which packages are installed
 _PACKAGES = frozenset({"site-packages", "dist-packages"})
+#: where the packages upd and geometry are
+_HOME = Path(__file__).resolve().parents[2]
+#: folders of the environment and of this program; geometry lies inside upd in a wheel
+_HOMES = tuple(
+    Path(home).resolve()
+    for home in (sys.prefix, sys.base_prefix, _HOME / "upd", _HOME / "geometry")
+)
 #: packages whose version a run writes into its log
 _LOGGED = ("numpy", "scipy", "scikit-fem", "gmsh", "pypardiso")
 
 
-def our_sources(root: Path | None = None) -> list[Path]:
-    """All Python files of the packages upd and geometry under ``root`` (that of this installation
-    when None), sorted.
+@cache
+def digest_of(root: Path) -> str:
+    """SHA-256 of the names, relative to ``root``, and the contents of all Python files of the
+    packages upd and geometry there.
     """
-    top = Path(__file__).resolve().parents[2] if root is None else root
-    return sorted(file for package in ("upd", "geometry") for file in (top / package).rglob("*.py"))
-
-
-def digest_of(files: Iterable[Path], root: Path) -> str:
-    """SHA-256 of the names, relative to ``root``, and the contents of ``files``."""
     digest = hashlib.sha256()
-    for file in files:
+    files = (file for package in ("upd", "geometry") for file in (root / package).rglob("*.py"))
+    for file in sorted(files):
         digest.update(file.relative_to(root).as_posix().encode())
         digest.update(hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()
-
-
-@cache
-def _ours() -> str:
-    return digest_of(our_sources(), Path(__file__).resolve().parents[2])
 
 
 @cache
@@ -61,7 +59,7 @@ def source_digest(recipe: str = "") -> str:
     OSError
         When the recipe's file cannot be read.
     """
-    digest = hashlib.sha256(f"{_ours()}{library_versions()}".encode())
+    digest = hashlib.sha256(f"{digest_of(_HOME)}{library_versions()}".encode())
     if recipe.lower().endswith((".py", ".msh", ".inp")):
         for file in user_files(Path(recipe)):
             digest.update(file.read_bytes())
@@ -108,14 +106,7 @@ def _imported(source: bytes) -> list[str]:
 
 def _installed(file: Path) -> bool:
     """Whether a module, its path resolved, is of the environment or of this program."""
-    return not _PACKAGES.isdisjoint(file.parts) or any(map(file.is_relative_to, _homes()))
-
-
-@cache
-def _homes() -> tuple[Path, ...]:
-    here = Path(__file__).resolve().parents[1]
-    homes = (sys.prefix, sys.base_prefix, here, here.with_name("geometry"))
-    return tuple(Path(home).resolve() for home in homes)
+    return not _PACKAGES.isdisjoint(file.parts) or any(map(file.is_relative_to, _HOMES))
 
 
 def key_of(data: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from upd import __version__
 from upd.errors import UpdError
 from upd.linalg import select
 from upd.linalg.compiled import kept_in
-from upd.mesh import recipes
+from upd.mesh.recipe_modules import geometry_module
 
 _PACKAGES = (
     "numpy",
@@ -48,7 +48,9 @@ def examine() -> list[tuple[str, str, bool]]:
     kept = kept_in("upd.linalg.smoothers")
     rows.append(("compiled functions", f"kept in {kept.parent}" if kept else _NOT_KEPT, bool(kept)))
     try:
-        rows.append(("gmsh libraries", recipes.gmsh_version(), True))
+        # loaded with its shared libraries: the error names what is missing
+        gmsh = geometry_module("blocks").import_gmsh()
+        rows.append(("gmsh libraries", gmsh.__version__, True))
     except UpdError as error:
         rows.append(("gmsh libraries", str(error), False))
     return rows

@@ -15,7 +15,7 @@ from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import Mesh, recipes
-from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
+from upd.mesh.checks import Pairs, check_pairs, edge_ratio, scaled_jacobian
 from upd.mesh.export import ENDINGS, write_mesh
 from upd.plot.answer_table import AnswerTable
 from upd.progress import Listener, Stages
@@ -101,17 +101,14 @@ def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
     """Sizes and worst elements of the bodies."""
     rows = []
     for name, mesh in meshes.items():
-        found = quality(mesh)
+        sizes = name, f"{mesh.n_node}", f"{mesh.n_hex}"
+        jacobian, ratio = scaled_jacobian(mesh), edge_ratio(mesh)
         for row, measure, value, worst in (
-            (
-                (name, f"{mesh.n_node}", f"{mesh.n_hex}"),
-                "scaled Jacobian",
-                f"{found.min:.3f}",
-                found.worst,
-            ),
-            (("", "", ""), "aspect ratio", f"{found.aspect:.1f}", found.longest),
+            (sizes, "scaled Jacobian", f"{jacobian.min():.3f}", jacobian.argmin()),
+            (("", "", ""), "aspect ratio", f"{ratio.max():.1f}", ratio.argmax()),
         ):
-            place = ", ".join(f"{x + 0.0:.3g}" for x in centre_of(mesh, worst))
+            centre = mesh.points[mesh.hexes[worst, :8]].mean(axis=0)
+            place = ", ".join(f"{x + 0.0:.3g}" for x in centre)
             rows.append((*row, measure, value, place))
     heads = ("body", "#nodes", "#hexahedra", "worst of", "#value", "at x, y, z, mm")
     print_table(console, AnswerTable("Bodies and their worst elements", heads, tuple(rows)))

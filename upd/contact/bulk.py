@@ -13,7 +13,7 @@ from upd.contact.model import Body
 from upd.contact.patch import Patch
 from upd.errors import MeshError
 from upd.fem.elements import gauss
-from upd.mesh.hexmesh import boundary_quads
+from upd.mesh.hexmesh import boundary_faces
 from upd.reference import boussinesq, boussinesq_stress, cerruti, cerruti_stress, love_rectangle
 
 Array = NDArray[np.float64]
@@ -108,7 +108,7 @@ def _free_faces(
     body: Body, x: Array, patch: Patch, radius: float, size: float
 ) -> NDArray[np.int64]:
     """Corners (n, 4) of the faces that are neither held, nor cuts, nor inside the contact."""
-    quads = boundary_quads(body.mesh)
+    quads = boundary_faces(body.mesh)[:, :4]
     held = np.zeros(body.mesh.n_node, bool)
     if "distant" not in body.mesh.weights:
         held[body.mesh.nodes["distant"]] = True

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from upd.errors import InputError
-from upd.fem.elements import BasisMaker, Material, hex_element
+from upd.fem.elements import CENTRE, BasisMaker, Material, hex_element
 from upd.mesh import FloatArray, IntArray, Mesh
 
 #: bytes of element matrices handled at a time: large enough to hide Python's overhead, small enough
@@ -145,7 +145,7 @@ def mass(
     maker = BasisMaker(mesh, chosen)
     pattern = _Pattern.of(maker.nodes, mesh.n_node)
     data = np.zeros(pattern.nodes.nnz)
-    phi = chosen.values_at(chosen.quadrature[0]).T
+    phi = chosen.shapes_at(chosen.quadrature[0])[0].T
     pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
     for block in _blocks(mesh.n_hex, chosen.n_node):
         M = (rho[block, None] * maker.basis(block).dx) @ pairs
@@ -186,10 +186,11 @@ def _weighted_gradients(maker: BasisMaker, block: slice) -> FloatArray:
     if element.incompatible:
         # Gradients by the Jacobian J0 at the centre, times |J0| / |J|: their integral vanishes, so
         # constant stress is met exactly.
-        cofactors = basis.mapping.jacobian(element.centre).cofactors[..., 0]
+        cofactors = basis.mapping.jacobian(CENTRE).cofactors[..., 0]
+        # of 1 - xi^2, 1 - eta^2, 1 - zeta^2 on the unit cube, (xi, eta, zeta) = 2 X - 1
+        modes = -4.0 * np.eye(3)[:, :, None] * (2.0 * element.quadrature[0] - 1.0)
         G[:, :, element.n_node :] = (
-            np.einsum("jin,mjq->nqmi", cofactors, element.mode_gradients)
-            * (basis.W / root)[:, :, None, None]
+            np.einsum("jin,mjq->nqmi", cofactors, modes) * (basis.W / root)[:, :, None, None]
         )
     return G
 

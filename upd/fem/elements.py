@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from skfem import CellBasis, ElementHex1, ElementHex2, ElementHexS2, MeshHex
-from skfem.assembly import Dofs
 from skfem.mapping import MappingIsoparametric
 
 from upd.errors import InputError, MeshError
@@ -23,6 +23,9 @@ from upd.mesh.hexmesh import free_sides
 
 #: names accepted wherever an element is asked for
 ELEMENTS = ("hex8", "hex8i", "hex20", "hex20r", "hex27")
+
+#: (3, 1) centre of the unit cube
+CENTRE: FloatArray = np.full((3, 1), 0.5)
 
 #: opposite sides of a hexahedron, S1 ... S6 from 0
 _OPPOSITE = ((0, 1), (2, 4), (3, 5))
@@ -139,11 +142,6 @@ class HexElement:
         return element
 
     @cached_property
-    def vtk_of_local(self) -> IntArray:
-        """(n_node,) VTK node number of each scikit-fem local node."""
-        return match_nodes(np.asarray(self.family.doflocs), VTK_NODES[: self.n_node])  # type: ignore[attr-defined]
-
-    @cached_property
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Points (3, n_quad) and weights (n_quad,).
 
@@ -151,22 +149,8 @@ class HexElement:
         """
         return gauss(self.n_gauss, 3)
 
-    @cached_property
-    def centre(self) -> FloatArray:
-        """(3, 1) centre of the unit cube."""
-        return np.full((3, 1), 0.5)
-
-    @cached_property
-    def mode_gradients(self) -> FloatArray:
-        """(3 modes, 3, n_quad) reference gradients of 1 - xi^2, 1 - eta^2, 1 - zeta^2.
-
-        Here (xi, eta, zeta) = 2 X - 1.
-        """
-        X = self.quadrature[0]
-        return -4.0 * np.eye(3)[:, :, None] * (2.0 * X - 1.0)
-
-    def gradients_at(self, X: FloatArray) -> FloatArray:
-        """Gradients of the shape functions at reference points.
+    def shapes_at(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Shape functions and their gradients at reference points.
 
         Parameters
         ----------
@@ -175,30 +159,17 @@ class HexElement:
 
         Returns
         -------
-        (n_node, 3, n) ndarray
+        values : (n_node, n) ndarray
             In scikit-fem node order.
+        gradients : (n_node, 3, n) ndarray
         """
-        shape = (3, X.shape[1])
-        return np.stack(
-            [np.broadcast_to(self.scalar.lbasis(X, a)[1], shape) for a in range(self.n_node)]
+        pairs = [self.scalar.lbasis(X, a) for a in range(self.n_node)]
+        shapes = X.shape[1:], (3, X.shape[1])
+        values, gradients = (
+            np.stack([np.broadcast_to(one, shape) for one in part])
+            for part, shape in zip(zip(*pairs, strict=True), shapes, strict=True)
         )
-
-    def values_at(self, X: FloatArray) -> FloatArray:
-        """Values of the shape functions at reference points.
-
-        Parameters
-        ----------
-        X : (3, n) ndarray
-            On the unit cube.
-
-        Returns
-        -------
-        (n_node, n) ndarray
-            In scikit-fem node order.
-        """
-        return np.stack(
-            [np.broadcast_to(self.scalar.lbasis(X, a)[0], X.shape[1:]) for a in range(self.n_node)]
-        )
+        return values, gradients
 
 
 _TABLE = {
@@ -246,8 +217,19 @@ def hex_element(name: str | None, mesh: Mesh) -> HexElement:
             f"{width}: use {fitting}."
         )
     _check_nodes(mesh)
-    if name == "hex20r":
-        _check_neighbours(mesh)
+    if name != "hex20r":
+        return element
+    # One hexahedron has six motions without stiffness at 2 x 2 x 2 points; neighbours in two
+    # directions suppress them, a row of single hexahedra passes one on, even from a clamped end.
+    shared = ~free_sides(mesh)
+    directions = sum(shared[:, pair].any(axis=1).astype(int) for pair in _OPPOSITE)
+    weak = np.flatnonzero(directions < 2)
+    if weak.size:
+        raise MeshError(
+            f"{weak.size} hexahedra have neighbours in one direction at most (first: hexahedron "
+            f"{weak[0]}), where hex20r has motions without stiffness: take hex20, or two elements "
+            "across."
+        )
     return element
 
 
@@ -269,23 +251,6 @@ def _check_nodes(mesh: Mesh) -> None:
         )
 
 
-def _check_neighbours(mesh: Mesh) -> None:
-    """Raises MeshError where 2 x 2 x 2 points leave a motion without stiffness.
-
-    One hexahedron has six of them; neighbours in two directions suppress them, a row of single
-    hexahedra passes one on, even from a clamped end.
-    """
-    shared = ~free_sides(mesh)
-    directions = sum(shared[:, pair].any(axis=1).astype(int) for pair in _OPPOSITE)
-    weak = np.flatnonzero(directions < 2)
-    if weak.size:
-        raise MeshError(
-            f"{weak.size} hexahedra have neighbours in one direction at most (first: hexahedron "
-            f"{weak[0]}), where hex20r has motions without stiffness: take hex20, or two elements "
-            "across."
-        )
-
-
 @dataclass(frozen=True)
 class Jacobian:
     """Jacobian d x_i / d X_j, (3, 3, n_hex, n), of a block of hexahedra at n reference points."""
@@ -298,8 +263,15 @@ class Jacobian:
 
         Row j is the cross product of the two other columns of DF.
         """
-        columns = self.DF[:, 0], self.DF[:, 1], self.DF[:, 2]
-        return np.stack([_cross(columns[(j + 1) % 3], columns[(j + 2) % 3]) for j in range(3)])
+        rows = []
+        for j in range(3):
+            u, v = self.DF[:, (j + 1) % 3], self.DF[:, (j + 2) % 3]
+            rows += [
+                u[1] * v[2] - u[2] * v[1],
+                u[2] * v[0] - u[0] * v[2],
+                u[0] * v[1] - u[1] * v[0],
+            ]
+        return np.stack(rows).reshape(self.DF.shape)
 
     @cached_property
     def det(self) -> FloatArray:
@@ -329,13 +301,6 @@ def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
     return product
 
 
-def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Cross product over the first axis."""
-    return np.stack(
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    )
-
-
 class HexMapping(MappingIsoparametric):  # type: ignore[misc]
     """Isoparametric mapping given by all nodes of each hexahedron.
 
@@ -363,50 +328,25 @@ class HexMapping(MappingIsoparametric):  # type: ignore[misc]
         """
         if self._last is None or self._last[0] is not X:
             n_hex, n_node, _ = self._nodes.shape
-            flat = self._nodes.transpose(2, 0, 1).reshape(-1, n_node) @ self._element.gradients_at(
-                X
-            ).reshape(n_node, -1)
-            self._last = (
-                X,
-                Jacobian(np.ascontiguousarray(flat.reshape(3, n_hex, 3, -1).transpose(0, 2, 1, 3))),
-            )
+            gradients = self._element.shapes_at(X)[1].reshape(n_node, -1)
+            flat = self._nodes.transpose(2, 0, 1).reshape(-1, n_node) @ gradients
+            DF = np.ascontiguousarray(flat.reshape(3, n_hex, 3, -1).transpose(0, 2, 1, 3))
+            self._last = X, Jacobian(DF)
         return self._last[1]
 
-    def DF(self, X: FloatArray, tind: IntArray | None = None, J: Any = None) -> FloatArray:
-        """(3, 3, n_hex, n) Jacobian d x_i / d X_j."""
-        return _chosen(self.jacobian(X).DF, tind)
-
-    def J(self, i: int, j: int, X: FloatArray, tind: IntArray | None = None) -> FloatArray:
-        """(n_hex, n) one component of the Jacobian."""
-        return _chosen(self.jacobian(X).DF[i, j], tind)
-
-    def detDF(self, X: FloatArray, tind: IntArray | None = None, J: Any = None) -> FloatArray:
+    def detDF(self, X: FloatArray, tind: None = None) -> FloatArray:
         """(n_hex, n) signed determinant of the Jacobian."""
-        return _chosen(self.jacobian(X).det, tind)
+        return self.jacobian(X).det
 
-    def invDF(self, X: FloatArray, tind: IntArray | None = None) -> FloatArray:
+    def invDF(self, X: FloatArray, tind: None = None) -> FloatArray:
         """(3, 3, n_hex, n) d X_j / d x_i."""
-        return _chosen(self.jacobian(X).inverse, tind)
+        return self.jacobian(X).inverse
 
-    def Fmap(self, i: int, X: FloatArray, tind: IntArray | None = None) -> FloatArray:
+    def Fmap(self, i: int, X: FloatArray, tind: None = None) -> FloatArray:
         """(n_hex, n) coordinate i of the reference points X (3, n)."""
-        return _chosen(self._nodes[:, :, i] @ self._element.values_at(X), tind)
+        return self._nodes[:, :, i] @ self._element.shapes_at(X)[0]
 
 
-def _chosen(values: FloatArray, tind: IntArray | None) -> FloatArray:
-    """The values (..., n_hex, n) of some hexahedra, all of them for None."""
-    return values if tind is None else values[..., tind, :]
-
-
-class _NodeDofs(Dofs):  # type: ignore[misc]
-    """Dof numbering of scikit-fem replaced by our node numbers: no edge or face tables needed."""
-
-    def __init__(self, element_dofs: IntArray, n_node: int) -> None:
-        self.element_dofs = element_dofs
-        self.N = n_node
-
-
-@dataclass(frozen=True)
 class BasisMaker:
     """Makes scikit-fem bases of the scalar shape functions over blocks of hexahedra.
 
@@ -416,26 +356,23 @@ class BasisMaker:
     ----------
     mesh : Mesh
     element : HexElement
+    nodes : (n_hex, n_node) array of int
+        Node numbers in scikit-fem local order.
     """
 
-    mesh: Mesh
-    element: HexElement
-
-    @cached_property
-    def nodes(self) -> IntArray:
-        """(n_hex, n_node) node numbers in scikit-fem local order."""
-        return np.ascontiguousarray(self.mesh.hexes[:, self.element.vtk_of_local])
-
-    @cached_property
-    def _doflocs(self) -> FloatArray:
-        return np.ascontiguousarray(self.mesh.points.T)
+    def __init__(self, mesh: Mesh, element: HexElement) -> None:
+        self.mesh, self.element = mesh, element
+        local: Any = element.family
+        order = match_nodes(np.asarray(local.doflocs), VTK_NODES[: element.n_node])
+        self.nodes: IntArray = np.ascontiguousarray(mesh.hexes[:, order])
+        self._points = np.ascontiguousarray(mesh.points.T)
 
     def mapping(self, block: slice = slice(None)) -> HexMapping:
         """The mapping of a block of hexahedra."""
         nodes = self.nodes[block]
         corners = np.ascontiguousarray(nodes[:, :8].T, dtype=np.int32)
         return HexMapping(
-            MeshHex(self._doflocs, corners, validate=False), self.element, self.mesh.points[nodes]
+            MeshHex(self._points, corners, validate=False), self.element, self.mesh.points[nodes]
         )
 
     def basis(self, block: slice = slice(None)) -> CellBasis:
@@ -447,42 +384,35 @@ class BasisMaker:
             When a hexahedron is inverted or collapsed (scikit-fem itself takes the absolute value).
         """
         mapping = self.mapping(block)
-        if (self._worst(mapping) <= self._rounding).any():
-            raise MeshError(self._problem())
+        # Below rounding of the scaled Jacobian a hexahedron counts as collapsed.
+        least = self.element.n_node * float(np.finfo(float).eps)
+        if (self._worst(mapping) <= least).any():
+            worst = self._worst(self.mapping())
+            count, k = int((worst <= least).sum()), int(worst.argmin())
+            raise MeshError(
+                f"{count} of {self.mesh.n_hex} hexahedra are inverted or collapsed: the "
+                "Jacobian determinant is not positive "
+                f"(worst: hexahedron {k}, scaled Jacobian {worst[k]:.3g}, corner nodes "
+                f"{self.mesh.hexes[k, :8].tolist()}). "
+                "List the nodes in VTK order (the top ring on the side the bottom ring's "
+                "normal points to), or move the nodes that tangle it."
+            )
         return CellBasis(
             mapping.mesh,
             self.element.scalar,
             mapping=mapping,
             quadrature=self.element.quadrature,
-            dofs=_NodeDofs(self.nodes[block].T, self.mesh.n_node),
+            # our node numbers: no edge or face tables needed
+            dofs=SimpleNamespace(element_dofs=self.nodes[block].T, N=self.mesh.n_node),
             disable_doflocs=True,
         )
 
-    @property
-    def _rounding(self) -> float:
-        """Rounding of the scaled Jacobian: below it a hexahedron counts as collapsed."""
-        return self.element.n_node * float(np.finfo(float).eps)
-
     def _worst(self, mapping: HexMapping) -> FloatArray:
         """(n_hex,) smallest scaled Jacobian at the integration points (hex8i: and the centre)."""
-        X = self.element.quadrature[0]
-        at_centre = (
-            [mapping.jacobian(self.element.centre).scaled] if self.element.incompatible else []
-        )
-        worst: FloatArray = np.hstack([*at_centre, mapping.jacobian(X).scaled]).min(axis=1)
+        places = [CENTRE] if self.element.incompatible else []
+        scaled = [mapping.jacobian(X).scaled for X in (*places, self.element.quadrature[0])]
+        worst: FloatArray = np.hstack(scaled).min(axis=1)
         return worst
-
-    def _problem(self) -> str:
-        worst = self._worst(self.mapping())
-        count, k = int((worst <= self._rounding).sum()), int(worst.argmin())
-        return (
-            f"{count} of {self.mesh.n_hex} hexahedra are inverted or collapsed: the "
-            "Jacobian determinant is not positive "
-            f"(worst: hexahedron {k}, scaled Jacobian {worst[k]:.3g}, corner nodes "
-            f"{self.mesh.hexes[k, :8].tolist()}). "
-            "List the nodes in VTK order (the top ring on the side the bottom ring's "
-            "normal points to), or move the nodes that tangle it."
-        )
 
 
 # -- material --------------------------------------------------------------------------------------
@@ -535,14 +465,11 @@ class Material:
             raise InputError("Material: " + "; ".join(problems) + ".")
 
     @property
-    def G(self) -> float:
-        """Shear modulus E / (2 (1 + nu)), MPa."""
+    def mu(self) -> float:
+        """Second Lamé parameter E / (2 (1 + nu)), MPa: the shear modulus."""
         return self.E / (2.0 * (1.0 + self.nu))
 
-    @property
-    def mu(self) -> float:
-        """Second Lamé parameter, MPa: the shear modulus."""
-        return self.G
+    G = mu
 
     @property
     def lam(self) -> float:

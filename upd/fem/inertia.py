@@ -152,7 +152,14 @@ def mass_properties(
     for block in _blocks(mesh.n_hex, 3 * element.n_node):
         mapping = maker.mapping(block)
         det = mapping.detDF(X)
-        _refuse_inverted(det, block.start)
+        worst = det.min(axis=1)
+        if not (worst > 0.0).all():
+            k = int(worst.argmin())
+            raise MeshError(
+                f"{int((worst <= 0.0).sum())} hexahedra are inverted or collapsed (worst: "
+                f"number {block.start + k}, Jacobian {worst[k]:.3g} mm3): "
+                "list the nodes in VTK order, or move the nodes that tangle it."
+            )
         dV = det * weights
         dm = rho[block, None] * dV
         x = np.stack([mapping.Fmap(i, X) for i in range(3)]) - origin[:, None, None]
@@ -163,17 +170,6 @@ def mass_properties(
     centre = first / mass
     about = second - mass * np.outer(centre, centre)
     return MassProperties(mass, volume, origin + centre, np.trace(about) * np.eye(3) - about)
-
-
-def _refuse_inverted(det: FloatArray, first: int) -> None:
-    worst = det.min(axis=1)
-    if not (worst > 0.0).all():
-        k = int(worst.argmin())
-        raise MeshError(
-            f"{int((worst <= 0.0).sum())} hexahedra are inverted or collapsed (worst: "
-            f"number {first + k}, Jacobian {worst[k]:.3g} mm3): "
-            "list the nodes in VTK order, or move the nodes that tangle it."
-        )
 
 
 def rigid_body_modes(points: FloatArray) -> FloatArray:

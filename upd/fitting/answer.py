@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.fitting.residuals import SHOWN, FittedCurve, FurtherMeasurement, Knowledge, Start, is_bent
+from upd.fitting.residuals import SHOWN, FittedCurve, Further, Knowledge, Start, is_bent
 from upd.fitting.targets import FitTarget, VariedInput, fitted_scene
 from upd.plot.answer_table import AnswerTable, Rounded
 from upd.plot.chart import Axis, Band, Chart, Trace
@@ -73,8 +73,11 @@ class Fit(FigureAnswer):
     ends : ndarray
         (n, 2) ln(factor) between which sets of inputs fit as well, the others fitted; nan where
         these were not sought.
-    further : tuple of FurtherMeasurement
-        What measurements that were not made would tell, the most telling first.
+    widest : float
+        Half-width of the widest direction, as a factor of the inputs.
+    further : tuple of (FitTarget, float, float)
+        What measurements that were not made would tell, the most telling first: the number with the
+        half-width that is assumed, half of what the inputs leave it, and the widest then.
     starts : list of Start
         Where every start ended, the best first.
     directions : str
@@ -96,7 +99,8 @@ class Fit(FigureAnswer):
     slopes: Array
     known: Knowledge
     ends: Array
-    further: tuple[FurtherMeasurement, ...]
+    widest: float
+    further: tuple[Further, ...]
     starts: list[Start]
     directions: str
     evaluations: int
@@ -211,7 +215,9 @@ def _farthest(found: Fit) -> str:
         return f"{one.target.name} {100.0 * one.off:.2g} % off, {max(rms):.2g} half-widths"
     i = int(np.argmax(off))
     target = found.targets[i]
-    return f"{target.name} {found.numbers[i]:.6g} {target.unit} for {target.shown}"
+    width = "" if target.half_width is None else f" ± {target.half_width:.3g} {target.unit}"
+    wanted = f"{target.value:.8g} {target.unit}{width}"
+    return f"{target.name} {found.numbers[i]:.6g} {target.unit} for {wanted}"
 
 
 def _off(found: Fit, i: int) -> float:
@@ -223,11 +229,12 @@ def _off(found: Fit, i: int) -> float:
 def _inputs(found: Fit) -> AnswerTable:
     rows: list[tuple[str, ...]] = []
     for k, one in enumerate(found.parameters):
-        factor, ends = math.exp(found.answers[0][k]), interval(found, k)
+        z, ends, (low, high) = float(found.answers[0][k]), interval(found, k), one.bounds
+        # within a thousandth of the room
+        bound = " (bound)" if min(z - low, high - z) < 1e-3 * (high - low) else ""
         for path, value in zip(one.paths, one.values, strict=True):
-            span = ("-", "-") if ends is None else _distinct(*(value * math.exp(z) for z in ends))
-            bound = " (bound)" if on_bound(found, k) else ""
-            fitted = Rounded(value * factor, ".5g", f"{{}}{bound}")
+            span = ("-", "-") if ends is None else _distinct(*(value * math.exp(e) for e in ends))
+            fitted = Rounded(value * math.exp(z), ".5g", f"{{}}{bound}")
             rows.append((path, one.unit, Rounded(value, ".5g"), fitted, *span))
     heads = ("input", "unit", "#scene", "#fitted", "#from", "#to")
     return AnswerTable("Inputs", heads, tuple(rows), _interval_note(found))
@@ -270,16 +277,12 @@ def _targets(found: Fit) -> AnswerTable:
         of = curve.target.curve
         values = f"{len(of.frequency)} {'complex' if of.is_complex else 'magnitudes'}"
         off = Rounded(100.0 * curve.off, ".2g", "{} % rms")
-        rows.append((curve.target.name, "(m/s2)/N", values, "", off, _half_width(curve)))
+        sizes = [f"{100.0 * curve.relative:.2g} %"] if curve.relative else []
+        sizes += [f"{curve.constant:.2g}"] if curve.constant else []
+        half = f"{' and '.join(sizes) or '0'}{' (estimated)' if curve.estimated else ''}"
+        rows.append((curve.target.name, "(m/s2)/N", values, "", off, half))
     heads = ("target", "unit", "#wanted", "#fitted", "#off", "half-width")
     return AnswerTable("Targets", heads, tuple(rows))
-
-
-def _half_width(noise: FittedCurve) -> str:
-    """Of a curve."""
-    parts = [f"{100.0 * noise.relative:.2g} %"] if noise.relative else []
-    parts += [f"{noise.constant:.2g}"] if noise.constant else []
-    return f"{' and '.join(parts) or '0'}{' (estimated)' if noise.estimated else ''}"
 
 
 def _measurements(found: Fit) -> AnswerTable:
@@ -288,19 +291,18 @@ def _measurements(found: Fit) -> AnswerTable:
         (
             one.name,
             one.unit,
-            Rounded(one.half_width, ".2g"),
-            *_distinct(one.low, one.high),
-            Rounded(one.then),
+            Rounded(one.half_width or 0.0, ".2g"),
+            *_distinct(one.value - spread, one.value + spread),
+            Rounded(then),
         )
-        for one in found.further
-        if one.then < one.widest**_GAIN
+        for one, spread, then in found.further
+        if then < found.widest**_GAIN
     )[:_FURTHER]
-    widest = f"{found.further[0].widest:.3g}" if found.further else ""
     heads = ("number", "unit", "#half-width", "#from", "#to", "#factor then")
     note = (
-        f"The least known direction of the inputs is known within a factor of {widest} today, and "
-        "of the last column after the measurement. Half-widths are assumed; the fit predicts "
-        "from and to."
+        "The least known direction of the inputs is known within a factor of "
+        f"{found.widest:.3g} today, and of the last column after the measurement. Half-widths are "
+        "assumed; the fit predicts from and to."
     )
     return AnswerTable("Next measurement", heads, rows, note)
 
@@ -308,28 +310,17 @@ def _measurements(found: Fit) -> AnswerTable:
 def _directions(found: Fit) -> AnswerTable:
     """How well the targets determine the inputs together, the least known direction first."""
     known = found.known
-    rows = tuple(
-        (_direction(found, row), "not determined" if unknown else Rounded(known.singular[0] / s))
-        for row, s, unknown in zip(known.directions, known.singular, known.unknown, strict=True)
-    )
+    rows = []
+    for row, s, unknown in zip(known.directions, known.singular, known.unknown, strict=True):
+        # which factors go together, the one that moves most growing
+        growth = _GROWTH ** (row / row[int(np.argmax(np.abs(row)))])
+        factors = zip(found.parameters, growth, strict=True)
+        names = " with ".join(f"{p.name} x {f:.4g}" for p, f in factors if abs(f - 1.0) >= 5e-5)
+        rows.append((names, "not determined" if unknown else Rounded(known.singular[0] / s)))
     heads = ("direction", "#times less known than the best")
-    shown = rows[::-1] if len(rows) > 1 or known.unknown.any() else ()
+    shown = tuple(rows[::-1]) if len(rows) > 1 or known.unknown.any() else ()
     note = "Inputs changed by the factors of the first direction move the targets least."
     return AnswerTable("Directions of the inputs", heads, shown, note)
-
-
-def _direction(found: Fit, row: Array) -> str:
-    """A direction of the inputs: which factors go together, the one that moves most growing."""
-    row = row / row[int(np.argmax(np.abs(row)))]
-    factors = zip(found.parameters, _GROWTH**row, strict=True)
-    return " with ".join(f"{one.name} x {f:.4g}" for one, f in factors if abs(f - 1.0) >= 5e-5)
-
-
-def on_bound(found: Fit, k: int) -> bool:
-    """Whether the answer lies on a bound of a parameter, within a thousandth of the room."""
-    low, high = found.parameters[k].bounds
-    z = float(found.answers[0][k])
-    return min(z - low, high - z) < 1e-3 * (high - low)
 
 
 def _is_sought(found: Fit, k: int) -> bool:
@@ -383,7 +374,7 @@ def _moves(found: Fit, k: int) -> Chart:
     one, z = found.parameters[k], float(found.answers[0][k])
     at = np.array([-_REACH, _REACH])
     numbers = found.numbers + at[:, None] * found.slopes[:, k]
-    x = one.values[0] * np.exp(z + at)
+    x, fitted = one.values[0] * np.exp(z + at), one.values[0] * math.exp(z)
     # the name of a table stands once: a second line would lie on the legend
     table = one.paths[0].rpartition(".")[0] + "."
     name = " + ".join((one.paths[0], *(path.removeprefix(table) for path in one.paths[1:])))
@@ -395,6 +386,6 @@ def _moves(found: Fit, k: int) -> Chart:
             Trace(target.name, x, 100.0 * (numbers[:, i] / target.value - 1.0), "line", i)
             for i, target in enumerate(found.targets)
         ),
-        bands=(Band("fitted", "x", one.value(z), one.value(z), dashed=True),),
+        bands=(Band("fitted", "x", fitted, fitted, dashed=True),),
         note="To first order.",
     )

@@ -43,7 +43,7 @@ import itertools
 import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,7 @@ from scipy.stats import t as student
 
 from upd.analyses.forced.model import quiet
 from upd.errors import ConvergenceError, UpdError, one_line
-from upd.fitting.responses import STEP, FitResponses, is_seated
+from upd.fitting.responses import STEP, FitResponses
 from upd.fitting.targets import (
     CONTACT_TOTALS,
     PEAK_NUMBERS,
@@ -125,7 +125,13 @@ class Residuals:
         self.target = np.concatenate([*values, *(one.values for one in targets.curves)])
         self.known = bool(targets.curves) or targets.numbers[0].half_width is not None
         self.low, self.high = np.array([one.bounds for one in responses.parameters]).T
-        self.curves = [first_noise(one) for one in targets.curves]
+        self.curves = []
+        for one in targets.curves:
+            noise = one.relative or 0.0, one.constant or 0.0
+            if not one.stated:
+                # each point by its own size, down to where differences of the highest are rounding
+                noise = 1.0, float(np.finfo(float).eps ** 0.5 * one.curve.magnitude.max())
+            self.curves.append(FittedCurve(one, *noise, estimated=not one.stated))
         self.scale = self._scales([one.curve.magnitude for one in targets.curves])
         ends = self.numbers + np.cumsum([0, *(len(one.values) for one in targets.curves)])
         #: values of every curve
@@ -317,15 +323,6 @@ class FittedCurve:
         H = self.target.curve.accelerance
         computed = self.computed if self.target.curve.is_complex else np.abs(self.computed)
         return float(np.linalg.norm(computed - H) / np.linalg.norm(H))
-
-
-def first_noise(target: CurveTarget) -> FittedCurve:
-    """Before any fit: as stated, else each point by its own size."""
-    if target.stated:
-        return FittedCurve(target, target.relative or 0.0, target.constant or 0.0, False)
-    # down to where differences of the highest are rounding
-    floor = float(np.finfo(float).eps ** 0.5 * target.curve.magnitude.max())
-    return FittedCurve(target, 1.0, floor, True)
 
 
 def as_complex(target: CurveTarget, parts: Array) -> NDArray[np.complex128]:
@@ -572,31 +569,9 @@ def profile_ends(residuals: Residuals, known: Knowledge, best: Array, k: int) ->
 # -- what to measure next --------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class FurtherMeasurement:
-    """What a measurement that was not made would tell.
-
-    Attributes
-    ----------
-    name, unit
-        Of the number, as a target names it.
-    low, high
-        What the fit predicts for it today.
-    half_width
-        Assumed of the measurement.
-    widest
-        Half-width of the widest direction today, as a factor of the inputs.
-    then
-        The same with the measurement.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    half_width: float
-    widest: float
-    then: float
+#: a number with the half-width that is assumed of its measurement, half of what the inputs leave it
+#: today, and the half-width of the widest direction then, as a factor of the inputs
+Further = tuple[FitTarget, float, float]
 
 
 def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targets:
@@ -627,8 +602,9 @@ def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targe
     return Targets(tuple(one for one in found if one.name not in made))
 
 
-def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasurement, ...]:
-    """Measurements by how much each would narrow the widest direction, the most telling first.
+def rank_measurements(residuals: Residuals, best: Array) -> tuple[float, tuple[Further, ...]]:
+    """Half-width of the widest direction today, as a factor of the inputs, and measurements by how
+    much each would narrow it, the most telling first.
 
     Parameters
     ----------
@@ -639,7 +615,7 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
     """
     made = residuals.responses
     scene, targets = made.scene, made.targets
-    friction = bool(targets.ratios) or (made.cheap and not is_seated(scene))
+    friction = bool(targets.ratios) or (made.cheap and not made.seated)
     asked = candidates(scene, targets, friction=friction)
     responses = FitResponses(scene, asked, made.parameters, needed=False, like=made)
     try:
@@ -647,7 +623,7 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
             value, slope = responses.at(best)
     except UpdError as error:
         log.info("further measurements: %s", one_line(error))
-        return ()
+        return math.nan, ()
     J = residuals.jacobian(best)
     if not residuals.known:
         each = [_half(one.unit, one.value, targets) for one in targets.numbers]
@@ -659,9 +635,8 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
         if np.isfinite(v) and np.isfinite(g).all():
             half, spread = _half(one.unit, v, targets), float(np.sqrt(g @ C @ g))
             then = _widest(C - np.outer(C @ g, C @ g) / (half**2 + spread**2))
-            ends = v - spread, v + spread
-            out.append(FurtherMeasurement(one.name, one.unit, *ends, half, now, then))
-    return tuple(sorted(out, key=lambda one: one.then))
+            out.append((replace(one, value=v, half_width=half), spread, then))
+    return now, tuple(sorted(out, key=lambda one: one[2]))
 
 
 def _half(unit: str, value: float, targets: Targets) -> float:

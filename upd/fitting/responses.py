@@ -68,11 +68,6 @@ _CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
 _FRICTIONLESS = "frictionless"
 
 
-def is_seated(scene: ForcedScene) -> bool:
-    """Whether friction changes the state at rest."""
-    return scene.contact.loaded and scene.contact.static == "seated"
-
-
 _DIRECTIONS: dict[int, Literal["one", "two"]] = {1: "one", 2: "two"}
 
 
@@ -281,7 +276,9 @@ class FitResponses:
         self._bodies: dict[str, Bodies] = {} if like is None else like._bodies
         self._models: dict[str, Model] = {}
         self._tangents: int | None = None
-        seated = bool(targets.ratios) and is_seated(scene)
+        #: whether friction changes the state at rest
+        self.seated = scene.contact.loaded and scene.contact.static == "seated"
+        seated = bool(targets.ratios) and self.seated
         #: inputs that make new blades, or a new static state, with every evaluation
         self.dear = [
             p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
@@ -309,12 +306,6 @@ class FitResponses:
         """Whether every evaluation re-uses the same reduced blades."""
         return not self.dear
 
-    @property
-    def cost(self) -> str:
-        """Which inputs make an evaluation slow; "" where none does."""
-        why = "every value makes new blades or a new static state"
-        return f"{', '.join(self.dear)}: {why}" if self.dear else ""
-
     def model(self, z: Array) -> tuple[ForcedPlan, Model]:
         """The model with moved inputs, and its plan.
 
@@ -328,12 +319,27 @@ class FitResponses:
         InputError
             Where the scene refuses the parameters.
         """
-        return self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
-
-    def totals(self, z: Array) -> dict[Side, FaceStiffness]:
-        """Contact stiffness of both faces."""
+        self.made += 1
         scene = self.bare(fitted_scene(self.scene, self.parameters, z))
-        return face_laws(scene.stiffnesses[self.stiffness], self._stages)
+        contact = replace(scene.contact, directions="auto")
+        if not self.targets.ratios or contact.static == _FRICTIONLESS:
+            # what the points carry at rest does not depend on it
+            contact = replace(contact, friction=self.scene.contact.friction)
+        frame = repr(replace(scene, stiffness={}, text="", contact=contact))
+        plan = _remembered(self._plans, frame, lambda: make_plan(scene))
+        plan = replace(plan, scene=scene)
+        bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
+        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
+        if frame in self._models:
+            return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
+        # small matrices once the blades are reduced
+        with threads_for(1) if bodies.reduced else nullcontext():
+            model = make_model(plan, bodies, laws)
+        model = _remembered(self._models, frame, lambda: model)
+        if self._tangents is None and scene.contact.directions == "auto":
+            # once chosen they stay: numbers would jump
+            self._tangents = model.contacts.tangents if bodies.half else None
+        return plan, model
 
     @property
     def directions(self) -> str:
@@ -360,31 +366,6 @@ class FitResponses:
                 stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
             )
         return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
-
-    def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Model]:
-        self.made += 1
-        frame = self._frame(scene)
-        plan = _remembered(self._plans, frame, lambda: make_plan(scene))
-        plan = replace(plan, scene=scene)
-        bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
-        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
-        if frame in self._models:
-            return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
-        # small matrices once the blades are reduced
-        with threads_for(1) if bodies.reduced else nullcontext():
-            model = make_model(plan, bodies, laws)
-        model = _remembered(self._models, frame, lambda: model)
-        if self._tangents is None and scene.contact.directions == "auto":
-            # once chosen they stay: numbers would jump
-            self._tangents = model.contacts.tangents if bodies.half else None
-        return plan, model
-
-    def _frame(self, scene: ForcedScene) -> str:
-        contact = replace(scene.contact, directions="auto")
-        if not self.targets.ratios or contact.static == _FRICTIONLESS:
-            # what the points carry at rest does not depend on it
-            contact = replace(contact, friction=self.scene.contact.friction)
-        return repr(replace(scene, stiffness={}, text="", contact=contact))
 
     def at(self, z: Array) -> tuple[Array, Array]:
         """The numbers, then the points of the curves, and their derivatives.
@@ -416,28 +397,23 @@ class FitResponses:
 
     def value(self, z: Array) -> Array:
         """(m,) without derivatives."""
-        z = np.asarray(z, float)
-        return self._evaluate(z, *self.model(z))
+        return self._evaluate(*self.model(np.asarray(z, float)))
 
     def solved_at(self, z: Array) -> tuple[Array, Array]:
         value = self.value(z)
         slope = np.zeros((len(value), len(self.parameters)))
         for k, step in enumerate(self.steps):
-            slope[:, k] = (self._moved(z, k, step) - value) / step
+            move = step * np.eye(len(z))[k]
+            slope[:, k] = (self.value(z + move) - value) / step
             if not self._needed:
-                below = (value - self._moved(z, k, -step)) / step
+                below = (value - self.value(z - move)) / step
                 # a number that jumps has no slope
                 largest = np.fmax(np.abs(slope[:, k]), np.abs(below))
                 jumps = np.abs(slope[:, k] - below) > JUMPS * largest
                 slope[jumps, k] = np.nan
         return value, slope
 
-    def _moved(self, z: Array, k: int, step: float) -> Array:
-        there = z.copy()
-        there[k] += step
-        return self.value(there)
-
-    def _evaluate(self, z: Array, plan: ForcedPlan, model: Model) -> Array:
+    def _evaluate(self, plan: ForcedPlan, model: Model) -> Array:
         parts: list[Array] = []
         with threads_for(len(model.M)):
             # what the balance leaves out is alike on every curve of a fit
@@ -453,7 +429,7 @@ class FitResponses:
                 try:
                     if one.of in CONTACT_TOTALS:
                         side, which = CONTACT_TOTALS[one.of]
-                        v = float(getattr(self.totals(z)[side], which))
+                        v = float(getattr(model.laws[side], which))
                     elif one.ratio is None:
                         v = _of_limits(plan, one.of, limit, peaks)
                     else:

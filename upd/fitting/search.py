@@ -132,13 +132,15 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         # a target that is not there is an error before anything is sought
         responses.at(np.zeros(len(parameters)))
     count = starts or (_FEW if not responses.cheap else _SOME if targets.ratios else _STARTS)
-    if responses.cost:
-        progress("fit", responses.cost, 0.0)
+    if responses.dear:
+        slow = f"{', '.join(responses.dear)}: every value makes new blades or a new static state"
+        progress("fit", slow, 0.0)
 
     def report(text: str, seconds: float | None) -> None:
         progress("fit", f"{text}, {responses.made} models", seconds)
 
-    with stages("fit", f"{targets.count} values, {len(parameters)} parameters, {count} starts"):
+    sizes = f"{len(residuals.target)} values, {len(parameters)} parameters, {count} starts"
+    with stages("fit", sizes):
         done = settled(residuals, search(residuals, count, report))
         found = answers(residuals, done)
         best = found[0]
@@ -146,7 +148,7 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         status = status_of(residuals, known, found)
     ends, rises = _ends(residuals, known, best, stages)
     with stages("further measurements", "what each would narrow"):
-        further = rank_measurements(residuals, best)
+        widest, further = rank_measurements(residuals, best)
     value, slope = responses.at(best)
     m = len(targets.numbers)
     return Fit(
@@ -164,6 +166,7 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         slope[:m],
         replace(known, rises=rises),
         ends,
+        widest,
         further,
         done,
         responses.directions,
@@ -238,7 +241,11 @@ def search(
     for k, begin in enumerate(residuals.starts(count), 1):
         report(f"start {k} of {count}", None)
         since = time.perf_counter()
-        done.append(_from(residuals, begin))
+        # of curves their magnitudes first, as logarithms, then as they are
+        near = residuals.solve(begin, coarse=bool(residuals.parts))
+        if residuals.parts and not near.failure:
+            near = replace(residuals.solve(residuals.inside(near.end)), begin=begin)
+        done.append(near)
         took = time.perf_counter() - since
         if took > _LONG_S:
             end = done[-1].failure or f"misfit {done[-1].misfit:.3g}"
@@ -246,17 +253,6 @@ def search(
     if not np.isfinite([one.misfit for one in done]).any():
         raise ConvergenceError(f"no start of the fit came to an answer: {done[0].failure}")
     return sorted(done, key=lambda one: one.misfit)
-
-
-def _from(residuals: Residuals, begin: Array) -> Start:
-    """One start: of curves their magnitudes first, as logarithms, then as they are."""
-    if not residuals.parts:
-        return residuals.solve(begin)
-    near = residuals.solve(begin, coarse=True)
-    if near.failure:
-        return near
-    found = residuals.solve(residuals.inside(near.end))
-    return replace(found, begin=begin)
 
 
 def settled(residuals: Residuals, done: list[Start]) -> list[Start]:

@@ -84,12 +84,6 @@ class FitTarget:
         """By what residuals are divided: the half-width, or the value itself."""
         return self.value if self.half_width is None else self.half_width
 
-    @property
-    def shown(self) -> str:
-        """With its unit and half-width."""
-        text = f"{self.value:.8g} {self.unit}"
-        return text if self.half_width is None else f"{text} ± {self.half_width:.3g} {self.unit}"
-
 
 @dataclass(frozen=True)
 class CurveTarget:
@@ -147,11 +141,6 @@ class Targets:
         found = [one.ratio for one in self.numbers]
         found += [one.curve.force_ratio for one in self.curves if one.curve.state is None]
         return tuple(sorted({one for one in found if one is not None}))
-
-    @property
-    def count(self) -> int:
-        """Of values."""
-        return len(self.numbers) + sum(len(one.values) for one in self.curves)
 
 
 def read_targets(
@@ -340,10 +329,6 @@ class VariedInput:
         """Of the logarithm of the factor."""
         return math.log(self.low), math.log(self.high)
 
-    def value(self, z: float) -> float:
-        """Of the first input, with the logarithm of the factor."""
-        return self.values[0] * math.exp(z)
-
 
 def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[VariedInput, ...]:
     """Parameters from "path", "path=low:high", "path+path=x0.1:x10".
@@ -369,9 +354,7 @@ def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[VariedInpu
     for text in vary:
         name, _, bounds = (part.strip() for part in text.partition("="))
         with problems.of(name):
-            one = _parameter(scene, keys, name, bounds)
-            _check_ends(scene, one, own=bool(bounds))
-            found.append(one)
+            found.append(_parameter(scene, keys, name, bounds))
     problems.twice([path for one in found for path in one.paths], "varied twice")
     problems.check()
     return tuple(found)
@@ -381,30 +364,22 @@ def _parameter(
     scene: ForcedScene, keys: Mapping[str, SceneKey], name: str, bounds: str
 ) -> VariedInput:
     paths = tuple(path.strip() for path in name.split("+"))
-    kinds, values = zip(*(_input(scene, keys, path) for path in paths), strict=True)
+    kinds, values = zip(*(scalar_input(scene, keys, path) for path in paths), strict=True)
+    for value in values:
+        if not value > 0.0:
+            raise InputError(f"is {value:g}; a fit varies inputs by factors: begin above 0")
     wide = _WIDE if set(kinds) == {_STIFFNESS} else _NARROW
     low, high = 1.0 / wide, wide
     if bounds:
         low, high = (end / values[0] for end in read_range(bounds, kinds[0], values[0]))
-    return VariedInput(paths, tuple(values), kinds[0], low, high)
-
-
-def _input(scene: ForcedScene, keys: Mapping[str, SceneKey], path: str) -> tuple[str, float]:
-    """Kind and value of a scalar input."""
-    kind, value = scalar_input(scene, keys, path)
-    if not value > 0.0:
-        raise InputError(f"is {value:g}; a fit varies inputs by factors: begin above 0")
-    return kind, value
-
-
-def _check_ends(scene: ForcedScene, one: VariedInput, *, own: bool) -> None:
-    """Raise InputError where the scene refuses an end of the bounds."""
+    found = VariedInput(paths, tuple(values), kinds[0], low, high)
     check_ends(
-        lambda value: fitted_scene(scene, [one], np.log([value / one.values[0]])),
-        (one.low * one.values[0], one.high * one.values[0]),
-        one.kind,
-        f"give {'other' if own else 'your own'} bounds, {one.paths[0]}=low:high",
+        lambda value: fitted_scene(scene, [found], np.log([value / values[0]])),
+        (low * values[0], high * values[0]),
+        kinds[0],
+        f"give {'other' if bounds else 'your own'} bounds, {paths[0]}=low:high",
     )
+    return found
 
 
 def fitted_scene(

@@ -56,6 +56,10 @@ MOST_DENSE = 600
 _BEYOND = 10.0
 #: watched motions whose peaks are printed
 _MOST_NAMED = 7
+_UNHELD = (
+    "friction alone holds row {}: where its joints slip nothing sets its mean place and nothing "
+    "balances a static force on it; give it a stiffness in K"
+)
 
 
 @dataclass(frozen=True)
@@ -233,11 +237,11 @@ def forced_response(
     )
     harmonics = settings.pop("harmonics", (0, 1))
     own = {name: settings.pop(name) for name in ("samples", "start", "slider") if name in settings}
-    model, damping = _read(K, M, C, zeta, dofs)
-    n = model.K.shape[0]
+    K, M, known, damping = _read(K, M, C, zeta, dofs)
+    n = K.shape[0]
     orders = hbm.harmonics(harmonics).numbers
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    rows = _Rows(model.dofs, n, problems)
+    rows = _Rows(known, n, problems)
     closing = [rows.motion("joint", j.closing) for j in joints]
     sliding = _sliding(joints, rows, problems)
     constant = rows.motion("static_force", static_force or {})
@@ -253,15 +257,16 @@ def forced_response(
     ]
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))
-    _refuse_penalties(model.K)
-    _refuse_multipliers(model)
+    _refuse_fixed(K, M)
     below = _BEYOND * max(orders) * float(f.max(initial=0.0))
-    reduced = _reduced(model, rows.used, modes, below, whole=damping is not None)
-    if reduced is None:
-        Kd, Md = model.K.toarray(), _mass(model).toarray()
-    else:
-        Kd, Md = reduced.K, reduced.M
-    _refuse_blurred(Kd, Md)
+    reduced = _reduced(K, M, rows.used, modes, below, whole=damping is not None)
+    Kd, Md = (K.toarray(), M.toarray()) if reduced is None else (reduced.K, reduced.M)
+    if count := _blurred(Kd, Md):
+        raise InputError(
+            f"forced_response: {count} elastic modes lie so far below the highest one that "
+            "rounding blurs them; "
+            "reduce with fewer modes (modes=), or leave out dofs that are far stiffer than the rest"
+        )
     at = np.eye(n)[rows.used] if reduced is None else reduced.at(rows.used)
     points = _contacts(joints, rows.matrix(closing) @ at, [rows.matrix(s) @ at for s in sliding])
     answer = hbm.frequency_response(
@@ -279,44 +284,35 @@ def forced_response(
     if answer.status == "stopped":
         free = np.linalg.norm(at @ _held_by_friction(Kd, joints, rows.matrix(closing) @ at), axis=1)
         if free.any():
-            row = int(rows.used[free.argmax()])
-            why = (
-                f"friction alone holds row {row}: where its joints slip nothing sets its mean "
-                "place and nothing balances a static force on it; give it a stiffness in K"
-            )
+            why = _UNHELD.format(int(rows.used[free.argmax()]))
             answer = replace(answer, message=f"{answer.message}; {why}")
     return OwnResponse(answer, dict(zip(watch, rows.matrix(watched) @ at, strict=True)), reduced)
 
 
 def _read(
     K: Any, M: Any, C: Any, zeta: ArrayLike | None, dofs: DofMap | Path | str | None
-) -> tuple[Matrices, csr_array | None]:
+) -> tuple[csr_array, csr_array, DofMap | None, csr_array | None]:
     """K, M and the map, C or None. Raises InputError when they do not fit."""
     if (C is None) == (zeta is None):
         raise InputError(
             "forced_response: give the damping once, as the matrix C or as the ratio zeta"
         )
     found = dofs if dofs is None or isinstance(dofs, DofMap) else read_dof_map(dofs)
-    model = Matrices(_matrix(K, "K"), _matrix(M, "M"), found)
-    check_sizes(model)
+    K, M = _matrix(K, "K"), _matrix(M, "M")
+    check_sizes(Matrices(K, M, found))
     damping = None if C is None else _matrix(C, "C")
-    if damping is not None and damping.shape != model.K.shape:
+    if damping is not None and damping.shape != K.shape:
         raise InputError(
-            f"Matrices: C is {damping.shape}, K is {model.K.shape}: write both from one "
+            f"Matrices: C is {damping.shape}, K is {K.shape}: write both from one "
             "model with one set of constraints."
         )
-    return model, damping
+    return K, M, found, damping
 
 
 def _matrix(A: Any, name: str) -> csr_array:
     if isinstance(A, (str, Path)):
         return read_matrix(A)
     return checked(A if hasattr(A, "tocsr") else np.asarray(A), name)
-
-
-def _mass(model: Matrices) -> csr_array:
-    assert model.M is not None
-    return model.M
 
 
 @dataclass
@@ -413,20 +409,22 @@ def _contacts(
 
 
 def _reduced(
-    model: Matrices, boundary: NDArray[np.int64], modes: int | None, below_hz: float, *, whole: bool
+    K: csr_array,
+    M: csr_array,
+    boundary: NDArray[np.int64],
+    modes: int | None,
+    below_hz: float,
+    *,
+    whole: bool,
 ) -> ReducedModel | None:
     """The reduced model, or None when the matrices can be taken whole.
 
     Whole: keep the basis everywhere.
     """
-    if (
-        modes is None
-        and model.K.shape[0] <= MOST_DENSE
-        and not _blurred(model.K.toarray(), _mass(model).toarray())
-    ):
+    if modes is None and K.shape[0] <= MOST_DENSE and not _blurred(K.toarray(), M.toarray()):
         return None
     size: dict[str, Any] = {"below_hz": below_hz} if modes is None else {"n_modes": modes}
-    return craig_bampton(model.K, model.M, boundary, rows=None if whole else boundary, **size)
+    return craig_bampton(K, M, boundary, rows=None if whole else boundary, **size)
 
 
 def _blurred(K: FloatArray, M: FloatArray) -> int:
@@ -453,9 +451,10 @@ def _held_by_friction(K: FloatArray, joints: Sequence[Joint], closing: FloatArra
     return np.asarray(motions[:, values <= rounding])
 
 
-def _refuse_penalties(K: csr_array) -> None:
-    """Refuse entries on the diagonal beside which rounding loses the others: dofs that other
-    programs fix.
+def _refuse_fixed(K: csr_array, M: csr_array) -> None:
+    """Refuse what other programs leave of dofs that do not move: entries on the diagonal beside
+    which rounding loses the others, and rows without mass and without stiffness of their own,
+    Lagrange multipliers.
     """
     diagonal = K.diagonal()
     order = np.argsort(diagonal)
@@ -468,26 +467,13 @@ def _refuse_penalties(K: csr_array) -> None:
             f"{len(fixed)} dofs, the first {int(fixed.min())}, a penalty beside which rounding "
             "loses the rest; leave these dofs out of K, M and C: they do not move"
         )
-
-
-def _refuse_multipliers(model: Matrices) -> None:
-    """Refuse rows without mass and without stiffness of their own: Lagrange multipliers."""
-    mass, stiffness = (abs(A).sum(axis=1) for A in (_mass(model), model.K))
-    found = np.flatnonzero((mass == 0.0) & (model.K.diagonal() == 0.0) & (stiffness > 0.0))
+    mass, stiffness = (abs(A).sum(axis=1) for A in (M, K))
+    found = np.flatnonzero((mass == 0.0) & (diagonal == 0.0) & (stiffness > 0.0))
     if len(found):
         raise InputError(
             f"forced_response: {len(found)} rows, the first {found[0]}, have no mass and a zero on "
             "the diagonal of K, as Lagrange multipliers have: leaving them out would drop their "
             "constraints; export the matrices with the constraints eliminated"
-        )
-
-
-def _refuse_blurred(K: FloatArray, M: FloatArray) -> None:
-    if count := _blurred(K, M):
-        raise InputError(
-            f"forced_response: {count} elastic modes lie so far below the highest one that "
-            "rounding blurs them; "
-            "reduce with fewer modes (modes=), or leave out dofs that are far stiffer than the rest"
         )
 
 

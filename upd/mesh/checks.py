@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from upd.errors import MeshError, OwnMeshError
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.hexmesh import EDGES, FACE_SIZE, MIDDLES, boundary_quads
+from upd.mesh.hexmesh import EDGES, FACE_SIZE, MIDDLES, boundary_faces
 
 #: set -> what it is for
 PURPOSE = {
@@ -51,7 +51,14 @@ def check_mesh(name: str, mesh: Mesh) -> None:
     """Raise OwnMeshError, with all problems, unless arrays have their shapes, numbers are finite
     and every node is there.
     """
-    problems = _point_problems(mesh.points)
+    problems = []
+    if np.ndim(mesh.points) != 2 or np.shape(mesh.points)[1] != 3:
+        problems.append(f"points have the shape {np.shape(mesh.points)}; give (n, 3), in mm")
+    elif not (finite := np.isfinite(np.asarray(mesh.points, dtype=float)).all(axis=1)).all():
+        problems.append(
+            f"{np.sum(~finite)} of {len(finite)} points are not finite, node {finite.argmin()} "
+            "first; to fix it: correct the recipe's coordinates"
+        )
     n = len(mesh.points) if np.ndim(mesh.points) else 0
     problems += _number_problems("hexes", mesh.hexes, n, tuple(FACE_SIZE))
     face_size = FACE_SIZE.get(np.shape(mesh.hexes)[-1]) if np.ndim(mesh.hexes) == 2 else None
@@ -68,23 +75,9 @@ def check_mesh(name: str, mesh: Mesh) -> None:
         raise OwnMeshError("\n".join(f"{name}: {problem}" for problem in problems))
 
 
-def _point_problems(points: Any) -> list[str]:
-    if np.ndim(points) != 2 or np.shape(points)[1] != 3:
-        return [f"points have the shape {np.shape(points)}; give (n, 3), in mm"]
-    bad = np.flatnonzero(~np.isfinite(np.asarray(points, dtype=float)).all(axis=1))
-    return (
-        [
-            f"{len(bad)} of {len(points)} points are not finite, node {bad[0]} first; to "
-            "fix it: correct the recipe's coordinates"
-        ]
-        if len(bad)
-        else []
-    )
-
-
 def _unmerged(mesh: Mesh) -> list[str]:
     """Whether parts of the body lie at the same places without being joined."""
-    points = mesh.points[np.unique(boundary_quads(mesh))]
+    points = mesh.points[np.unique(boundary_faces(mesh)[:, :4])]
     edges = np.diff(mesh.points[mesh.hexes[:, EDGES]], axis=2)
     apart = min(rounding(points), 1e-3 * float(np.linalg.norm(edges, axis=3).min()))
     pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
@@ -295,32 +288,6 @@ def _normal(one: FloatArray, two: FloatArray) -> FloatArray:
 # -- shape -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Quality:
-    """Shape of a mesh's hexahedra.
-
-    Attributes
-    ----------
-    min, mean
-        Scaled Jacobian; 1 for a brick, <= 0 for an inverted element.
-    worst
-        Number of the element with the smallest one.
-    n_negative
-        Elements with a scaled Jacobian <= 0.
-    aspect
-        Largest ratio of longest to shortest edge in one element.
-    longest
-        Number of the element with that ratio.
-    """
-
-    min: float
-    mean: float
-    worst: int
-    n_negative: int
-    aspect: float
-    longest: int
-
-
 def _determinant(axes: FloatArray) -> FloatArray:
     """Determinant of (..., 3, 3) unit row vectors; 0 where a row has no length."""
     length = np.linalg.norm(axes, axis=-1, keepdims=True)
@@ -335,8 +302,9 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
     """Scaled Jacobian of every hexahedron, (n_hex,).
 
     Least determinant of the unit edge vectors over the 8 corners and of the unit principal axes at
-    the centre (Verdict Library Reference Manual, SAND2007-1751, 6.16). Edges of 20- and 27-node
-    elements are taken where they leave the corner, so that a bent edge counts.
+    the centre; 1 for a brick, <= 0 for an inverted element (Verdict Library Reference Manual,
+    SAND2007-1751, 6.16). Edges of 20- and 27-node elements are taken where they leave the corner,
+    so that a bent edge counts.
     """
     corner = mesh.points[mesh.hexes[:, :8]]
     edges = corner[:, _NEIGHBOURS] - corner[:, :, None, :]
@@ -359,25 +327,3 @@ def edge_ratio(mesh: Mesh) -> FloatArray:
         length.max(axis=1), shortest, out=np.full(len(length), np.inf), where=shortest > 0.0
     )
     return ratio
-
-
-def quality(mesh: Mesh) -> Quality:
-    """Least and mean scaled Jacobian, the worst element, how many are inverted, and the largest
-    edge ratio.
-    """
-    jacobian, ratio = scaled_jacobian(mesh), edge_ratio(mesh)
-    worst, longest = int(jacobian.argmin()), int(ratio.argmax())
-    return Quality(
-        min=float(jacobian[worst]),
-        mean=float(jacobian.mean()),
-        worst=worst,
-        n_negative=int(np.count_nonzero(jacobian <= 0.0)),
-        aspect=float(ratio[longest]),
-        longest=longest,
-    )
-
-
-def centre_of(mesh: Mesh, element: int) -> FloatArray:
-    """Mean of the corners of one hexahedron, (3,) in mm."""
-    centre: FloatArray = mesh.points[mesh.hexes[element, :8]].mean(axis=0)
-    return centre

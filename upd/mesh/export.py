@@ -47,7 +47,6 @@ def write_mesh(meshes: Mapping[str, Mesh], path: Path | str, *, element: str | N
         raise InputError(
             f"{path}: an element type ({element}) belongs to .inp files only; leave it out"
         )
-    _check(meshes)
     with placed_file(path) as temporary:
         if ending == ".inp":
             with temporary.open("w", encoding="ascii", newline="\n") as file:
@@ -67,19 +66,15 @@ def write_fields(path: Path | str, meshes: Mapping[str, Mesh], point_data: Field
     path = Path(path)
     if path.suffix.lower() != ".vtu":
         raise InputError(f"{path}: fields are written as .vtu; choose that ending")
-    _check(meshes)
     data = _merged(meshes, point_data)
     with placed_file(path) as temporary:
         _write_vtu(meshes, temporary, data)
 
 
-def _check(meshes: Mapping[str, Mesh]) -> None:
-    if not meshes:
-        raise InputError("export: there is no mesh to write")
-
-
 def _offsets(meshes: Mapping[str, Mesh]) -> IntArray:
     """Number of the first node of each body in the merged file."""
+    if not meshes:
+        raise InputError("export: there is no mesh to write")
     return np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])]).astype(
         np.int64
     )

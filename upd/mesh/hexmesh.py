@@ -113,15 +113,8 @@ class NamedElements(NamedTuple):
 # -- the outside -----------------------------------------------------------------------------------
 
 
-def boundary_quads(mesh: Mesh) -> IntArray:
-    """Corner nodes of the sides that belong to one hexahedron only, (n, 4), seen from outside
-    counter-clockwise.
-    """
-    return boundary_faces(mesh)[:, :4]
-
-
 def boundary_faces(mesh: Mesh) -> IntArray:
-    """All nodes of the sides that belong to one hexahedron only, (n, 4 | 8 | 9).
+    """Nodes of the sides that belong to one hexahedron only, (n, 4 | 8 | 9).
 
     The ring first, seen from outside counter-clockwise, then mid-edges, then the centre.
     """

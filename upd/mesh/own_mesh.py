@@ -14,13 +14,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from upd.errors import InputError, OwnMeshError
 from upd.mesh import FloatArray, IntArray, Mesh
 from upd.mesh.checks import OUT_OF_LINE, in_pairs
+from upd.mesh.fields import field_faults, whole
 from upd.mesh.hexmesh import CENTRES, FACE_SIZE, NamedElements, boundary_faces
 
 #: beginnings of the names of elements without a volume: plane and axisymmetric ones, shells,
@@ -49,20 +50,23 @@ def read_inp(path: Path) -> tuple[FloatArray, list[NamedElements]]:
     a damaged file and OwnMeshError for one that is not flat or has no volume.
     """
     deck = _Deck()
-    for block in _blocks(path.read_bytes()):
-        word, options = block.word, block.options
+    for place, word, options, lines in _blocks(path.read_bytes()):
         if word in _NOT_READ or not _NOT_READ.isdisjoint(options):
             raise OwnMeshError(
-                f"line {block.line}: {', '.join((f'*{word}', *options))}: is not read; to fix it: "
+                f"line {place}: {', '.join((f'*{word}', *options))}: is not read; to fix it: "
                 "write a flat file, without parts and instances, all in one, in Cartesian "
                 "coordinates"
             )
         if word == "NODE":
-            deck.add_nodes(block)
+            found = [_number(int, line, 0) for line in lines]
+            for label, line in zip(found, lines, strict=True):
+                deck.nodes[label] = [_number(float, line, k) for k in (1, 2, 3)]
+            if "NSET" in options:
+                deck.nsets.setdefault(options["NSET"], []).extend(found)
         elif word == "ELEMENT":
-            deck.add_elements(block)
+            deck.add_elements(place, options, lines)
         elif word in ("NSET", "ELSET") and word in options:
-            deck.add_set(block)
+            deck.add_set(word, options, lines)
     kinds = {kind for kind, _ in deck.elements.values()}
     if kinds and all(kind.startswith(_THIN) for kind in kinds):
         raise OwnMeshError(
@@ -78,13 +82,8 @@ def read_inp(path: Path) -> tuple[FloatArray, list[NamedElements]]:
 _Line = tuple[int, list[str]]
 
 
-class _Block(NamedTuple):
-    """A keyword with its place in the file, from 1, its options in small letters, data lines."""
-
-    line: int
-    word: str
-    options: dict[str, str]
-    lines: list[_Line]
+#: a keyword: its place in the file, from 1, its word, its options in small letters, data lines
+_Block = tuple[int, str, dict[str, str], list[_Line]]
 
 
 @dataclass
@@ -96,41 +95,32 @@ class _Deck:
     nsets: dict[str, list[int]] = field(default_factory=dict)
     elsets: dict[str, list[int]] = field(default_factory=dict)
 
-    def add_nodes(self, block: _Block) -> None:
-        found = [_number(int, line, 0) for line in block.lines]
-        for label, line in zip(found, block.lines, strict=True):
-            self.nodes[label] = [_number(float, line, k) for k in (1, 2, 3)]
-        if "NSET" in block.options:
-            self.nsets.setdefault(block.options["NSET"], []).extend(found)
-
-    def add_elements(self, block: _Block) -> None:
-        kind = block.options.get("TYPE", "").upper()
-        rows = [_integers(line) for line in block.lines]
+    def add_elements(self, place: int, options: Mapping[str, str], lines: list[_Line]) -> None:
+        kind = options.get("TYPE", "").upper()
+        rows = [_integers(line) for line in lines]
         if size := _size(kind):
             numbers = [number for row in rows for number in row]
             if len(numbers) % (size + 1):
                 raise ValueError(
-                    f"line {block.line}: {kind} elements have {size} nodes each, these "
+                    f"line {place}: {kind} elements have {size} nodes each, these "
                     f"{len(numbers)} numbers are not whole elements"
                 )
             rows = [numbers[k : k + size + 1] for k in range(0, len(numbers), size + 1)]
         self.elements |= {row[0]: (kind, row[1:]) for row in rows if row}
-        self.elsets.setdefault(block.options.get("ELSET", ""), []).extend(
-            row[0] for row in rows if row
-        )
+        self.elsets.setdefault(options.get("ELSET", ""), []).extend(row[0] for row in rows if row)
 
-    def add_set(self, block: _Block) -> None:
-        known = self.nsets if block.word == "NSET" else self.elsets
-        found = known.setdefault(block.options[block.word], [])
-        for line in block.lines:
-            if "GENERATE" in block.options:
+    def add_set(self, word: str, options: Mapping[str, str], lines: list[_Line]) -> None:
+        known = self.nsets if word == "NSET" else self.elsets
+        found = known.setdefault(options[word], [])
+        for line in lines:
+            if "GENERATE" in options:
                 first, last, *step = _integers(line)
                 found.extend(range(first, last + 1, step[0] if step else 1))
                 continue
-            for k, word in enumerate(line[1]):
-                if word.lower() in known:
-                    found.extend(known[word.lower()])
-                elif word:
+            for k, name in enumerate(line[1]):
+                if name.lower() in known:
+                    found.extend(known[name.lower()])
+                elif name:
                     found.append(_number(int, line, k))
 
     def groups(self, labels: IntArray, points: FloatArray) -> Iterator[NamedElements]:
@@ -206,7 +196,7 @@ def _blocks(data: bytes) -> Iterator[_Block]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:  # comments may be in the Latin-1 of older programs
         text = data.decode("latin-1")
-    block = _Block(0, "", {}, [])
+    block: _Block = (0, "", {}, [])
     for place, raw in enumerate(text.splitlines(), 1):
         line = raw.strip()
         if not line or line.startswith("**"):
@@ -216,9 +206,9 @@ def _blocks(data: bytes) -> Iterator[_Block]:
             first, *rest = (part.strip() for part in line[1:].split(","))
             pairs = (part.partition("=") for part in rest)
             options = {key.strip().upper(): value.strip().lower() for key, _, value in pairs}
-            block = _Block(place, first.upper(), options, [])
+            block = (place, first.upper(), options, [])
         else:
-            block.lines.append((place, [cell.strip() for cell in line.split(",")]))
+            block[3].append((place, [cell.strip() for cell in line.split(",")]))
     yield block
 
 
@@ -248,6 +238,8 @@ class MeshFile:
     def __post_init__(self) -> None:
         if not self.scale > 0.0:
             raise InputError(f"scale: {self.scale!r} is not positive; 1000 for a file in metres")
+        if faults := field_faults(self):
+            raise InputError("; ".join(faults))
 
 
 @dataclass(frozen=True)
@@ -280,12 +272,7 @@ class SectorFile(MeshFile):
         Number of blades.
     """
 
-    n_sectors: int = 0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.n_sectors < 2:
-            raise InputError(f"n_sectors: {self.n_sectors} is less than 2; give that of the disk")
+    n_sectors: int = whole(0, 2, why="give that of the disk")
 
 
 def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
@@ -320,20 +307,13 @@ def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
     # what a scene may give
     build.__annotations__["params"] = RigFile if rig else SectorFile if sector else MeshFile
     vars(module)["build"] = build
-    other = "bladed disk" if sector else _contact_analysis(meshes)
+    # flat where all contact nodes lie in one plane, to what pairs of nodes may be out of line
+    sets = [mesh.points[mesh.nodes.get("contact", [])] for mesh in meshes.values()]
+    extents = [np.ptp(points, axis=0) for points in sets if len(points)]
+    flat = bool(extents) and all(x[2] <= OUT_OF_LINE * x.max() for x in extents)
+    other = "bladed disk" if sector else "flat contact" if flat else "curved contact"
     vars(module)["ANALYSIS"] = "rig" if rig else other
     return module
-
-
-def _contact_analysis(meshes: Mapping[str, Mesh]) -> str:
-    """Flat where all contact nodes lie in one plane, curved else."""
-    faces = [
-        mesh.points[mesh.nodes["contact"]] for mesh in meshes.values() if "contact" in mesh.nodes
-    ]
-    # To what pairs of nodes may be out of line.
-    extents = [np.ptp(points, axis=0) for points in faces if len(points)]
-    flat = bool(extents) and all(x[2] <= OUT_OF_LINE * x.max() for x in extents)
-    return "flat contact" if flat else "curved contact"
 
 
 def _scaled(meshes: Mapping[str, Mesh], params: MeshFile) -> dict[str, Mesh]:

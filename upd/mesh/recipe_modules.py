@@ -25,6 +25,11 @@ MESH_ENDINGS = (".msh", ".inp")
 READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig", "sector")
 
 
+#: our geometry package lies beside ours, or inside it in a wheel
+_HOME = Path(__file__).resolve().parents[1]
+_GEOMETRY = (_HOME if (_HOME / "geometry").is_dir() else _HOME.parent) / "geometry/__init__.py"
+
+
 def is_file(recipe: str) -> bool:
     """Whether a recipe is named by its file: .py, or a mesh (.msh, .inp)."""
     return recipe.lower().endswith((".py", *MESH_ENDINGS))
@@ -58,17 +63,14 @@ def geometry_module(name: str) -> ModuleType:
     files of that name elsewhere do not matter. Raises InputError when another module of that name
     has been imported before.
     """
-    package = Path(__file__).resolve().parents[1]
-    inside, beside = (home / "geometry/__init__.py" for home in (package, package.parent))
-    file = inside if inside.is_file() else beside
     known = sys.modules.get("geometry")
     if known is None:
-        spec = importlib.util.spec_from_file_location("geometry", file)
+        spec = importlib.util.spec_from_file_location("geometry", _GEOMETRY)
         assert spec is not None and spec.loader is not None
         known = sys.modules["geometry"] = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(known)
     origin = getattr(known, "__file__", None) or "another module"
-    if Path(origin).resolve() != file:
+    if origin != str(_GEOMETRY) and Path(origin).resolve() != _GEOMETRY:
         raise InputError(
             f"recipes: upd's package 'geometry' is hidden by {origin}: rename that file or start "
             "elsewhere"

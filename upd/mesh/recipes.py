@@ -13,7 +13,7 @@ import typing
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from upd.cache.arrays import cache_folder, load_arrays, save_arrays, unreadable
 from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError, did_you_mean
 from upd.mesh import FloatArray
-from upd.mesh.checks import check_mesh, check_pairs, quality
+from upd.mesh.checks import check_mesh, check_pairs, scaled_jacobian
 from upd.mesh.fields import DamperSizes
 from upd.mesh.hexmesh import Mesh
 from upd.mesh.recipe_modules import geometry_module, is_file, is_mesh, line_of, module_of
@@ -186,39 +186,27 @@ def counted_by_mesh(recipe: str) -> bool:
     return not hasattr(module_of(recipe), "count")
 
 
-def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Body -> names of the sets distant_... that may be held.
+def sets_of(
+    recipe: str, params: Mapping[str, Any], kind: Literal["DISTANT", "WEIGHTED"]
+) -> dict[str, tuple[str, ...]]:
+    """Body -> names of its sets: distant_... without that beginning, which may be held, or those
+    with weights, which hold it in the mean.
 
-    From the recipe's DISTANT, or by meshing when it declares none.
+    From what the recipe declares, else from its mesh; without weights where a recipe that counts
+    its nodes declares none.
     """
-    declared = _declared_sets(recipe, "DISTANT")
-    if declared is not None:
-        return declared
+    declared = getattr(module_of(recipe), kind, None)
+    if isinstance(declared, Mapping):
+        return {str(body): tuple(map(str, names)) for body, names in declared.items()}
+    if kind == "WEIGHTED" and not counted_by_mesh(recipe):
+        return {}
     meshes, _ = build_mesh(recipe, params)
+    if kind == "WEIGHTED":
+        return {body: tuple(mesh.weights) for body, mesh in meshes.items()}
     return {
         body: tuple(n.removeprefix("distant_") for n in mesh.nodes if n.startswith("distant_"))
         for body, mesh in meshes.items()
     }
-
-
-def weighted_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Body -> names of its sets with weights, which hold it in the mean.
-
-    From the recipe's WEIGHTED, or the mesh of one that is counted by its mesh.
-    """
-    declared = _declared_sets(recipe, "WEIGHTED")
-    if declared is not None or not counted_by_mesh(recipe):
-        return declared or {}
-    meshes, _ = build_mesh(recipe, params)
-    return {body: tuple(mesh.weights) for body, mesh in meshes.items()}
-
-
-def _declared_sets(recipe: str, name: str) -> dict[str, tuple[str, ...]] | None:
-    """Body -> names of sets that a recipe declares; None when it does not."""
-    declared = getattr(module_of(recipe), name, None)
-    if not isinstance(declared, Mapping):
-        return None
-    return {str(body): tuple(map(str, names)) for body, names in declared.items()}
 
 
 def closed_form(recipe: str) -> str:
@@ -226,20 +214,14 @@ def closed_form(recipe: str) -> str:
     return str(getattr(module_of(recipe), "CLOSED_FORM", ""))
 
 
-def analysis(recipe: str) -> str:
-    """The analysis a recipe declares its geometry is for (its ANALYSIS).
-
-    A curved contact when it declares none.
-    """
-    return str(getattr(module_of(recipe), "ANALYSIS", "curved contact"))
-
-
 def analyses(recipe: str) -> tuple[str, ...]:
     """All analyses a recipe declares its geometry is for.
 
-    Its ANALYSIS and what its OTHER_ANALYSES names.
+    Its ANALYSIS, a curved contact where it declares none, and what its OTHER_ANALYSES names.
     """
-    return (analysis(recipe), *getattr(module_of(recipe), "OTHER_ANALYSES", ()))
+    module = module_of(recipe)
+    first = str(getattr(module, "ANALYSIS", "curved contact"))
+    return (first, *getattr(module, "OTHER_ANALYSES", ()))
 
 
 def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
@@ -304,15 +286,6 @@ def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:
         raise InputError(f"recipe {recipe!r}: has no {what}; add a function {function}(params)")
     declared: Callable[[Any], Any] = found
     return declared
-
-
-def gmsh_version() -> str:
-    """Version of gmsh, loaded with its shared libraries.
-
-    Raises MeshError naming what is missing.
-    """
-    version: str = geometry_module("blocks").import_gmsh().__version__
-    return version
 
 
 def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
@@ -394,13 +367,14 @@ def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
     for name, mesh in meshes.items():
         if is_file(recipe):
             check_mesh(name, mesh)
-        found = quality(mesh)
-        if not found.min > LEAST_JACOBIAN:
-            x, y, z = mesh.points[mesh.hexes[found.worst]].mean(axis=0)
+        jacobian = scaled_jacobian(mesh)
+        worst = int(jacobian.argmin())
+        if not jacobian[worst] > LEAST_JACOBIAN:
+            x, y, z = mesh.points[mesh.hexes[worst]].mean(axis=0)
             raise MeshError(
-                f"{name}: hexahedron {found.worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm "
-                f"has the scaled Jacobian {found.min:.3g}, "
-                f"more than {LEAST_JACOBIAN:g} is needed ({found.n_negative} of "
+                f"{name}: hexahedron {worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm "
+                f"has the scaled Jacobian {jacobian[worst]:.3g}, "
+                f"more than {LEAST_JACOBIAN:g} is needed ({int((jacobian <= 0.0).sum())} of "
                 f"{mesh.n_hex} are inverted): "
                 + (
                     "mesh it anew there, with nodes in the file's order of corners"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from upd.mesh.hexmesh import EDGES, FloatArray, IntArray, Mesh, boundary_quads
+from upd.mesh.hexmesh import EDGES, FloatArray, IntArray, Mesh, boundary_faces
 
 #: distance by which the plane of a section is moved off lattice planes, relative to the meshes
 _BESIDE = 1e-5
@@ -101,20 +101,9 @@ class SectionView:
     window: tuple[Point, Point] | None = None
 
 
-@dataclass(frozen=True)
-class CutBody:
-    """A body in a section.
-
-    Attributes
-    ----------
-    cells
-        Polygons of the elements that the plane cuts, each (n, 2) in mm.
-    outline
-        Pieces of its boundary, (n, 2, 2).
-    """
-
-    cells: list[FloatArray] = field(default_factory=list)
-    outline: FloatArray = field(default_factory=lambda: np.empty((0, 2, 2)))
+#: a body in a section: polygons (n, 2) of the elements that the plane cuts, and pieces (m, 2, 2) of
+#: its boundary, mm
+CutBody = tuple[list[FloatArray], FloatArray]
 
 
 def plain_views(meshes: Mapping[str, Mesh]) -> list[SectionView]:
@@ -164,18 +153,14 @@ def _cut(mesh: Mesh, axes: tuple[int, int], normal: int, level: float) -> CutBod
         found = _crossings(flat, height, ends[(height[ends] > 0.0).sum(axis=1) == 1])
         middle = found - found.mean(axis=0)
         cells.append(found[np.argsort(np.arctan2(middle[:, 1], middle[:, 0]))])
-    return CutBody(cells, _outline(mesh, flat, height))
-
-
-def _outline(mesh: Mesh, flat: FloatArray, height: FloatArray) -> FloatArray:
-    """Pieces in which the plane meets the sides of the boundary, (n, 2, 2)."""
-    quads = boundary_quads(mesh)
+    # Pieces in which the plane meets the sides of the boundary: a flat side is met in two of its
+    # edges or in none.
+    quads = boundary_faces(mesh)[:, :4]
     edges = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2)
     crossed = (height[edges] > 0.0).sum(axis=2) == 1
-    # a flat side is met in two of its edges or in none
     two = crossed.sum(axis=1) == 2
     ends = edges[two][crossed[two]]
-    return _crossings(flat, height, ends).reshape(-1, 2, 2)
+    return cells, _crossings(flat, height, ends).reshape(-1, 2, 2)
 
 
 def _crossings(flat: FloatArray, height: FloatArray, ends: IntArray) -> FloatArray:

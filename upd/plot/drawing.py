@@ -53,7 +53,7 @@ def _section(
     view: SectionView, bodies: Mapping[str, CutBody]
 ) -> tuple[list[FloatArray], tuple[FloatArray, FloatArray]]:
     """Points of what is shown, and their least and largest coordinates."""
-    points = [body.outline.reshape(-1, 2) for body in bodies.values()]
+    points = [outline.reshape(-1, 2) for _, outline in bodies.values()]
     if view.window is not None:
         points = [np.array(view.window)]
     every = np.vstack(points)
@@ -63,14 +63,14 @@ def _section(
 def _draw(
     ax: Axes, *, view: SectionView, bodies: Mapping[str, CutBody], size: tuple[float, float]
 ) -> None:
-    for k, (name, body) in enumerate(bodies.items()):
-        if not body.cells:
+    for k, (name, (cells, outline)) in enumerate(bodies.items()):
+        if not cells:
             continue
         pale = tuple(_PALE + (1.0 - _PALE) * c for c in to_rgb(COLOURS[k % len(COLOURS)]))
         ax.add_collection(
-            PolyCollection(body.cells, facecolors=[pale], edgecolors="white", linewidths=0.3)
+            PolyCollection(cells, facecolors=[pale], edgecolors="white", linewidths=0.3)
         )
-        ax.add_collection(LineCollection(list(body.outline), colors=OUTLINE, linewidths=0.9))
+        ax.add_collection(LineCollection(list(outline), colors=OUTLINE, linewidths=0.9))
         ax.plot([], [], "s", color=pale, label=name)
     for k, name in enumerate(dict.fromkeys(name for name, *_ in view.strips)):
         style: dict[str, Any] = {"color": _STRIPS[k % 2], "linewidth": 3, "solid_capstyle": "butt"}

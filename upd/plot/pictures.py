@@ -19,7 +19,7 @@ from matplotlib.patches import Patch as LegendPatch
 from numpy.typing import NDArray
 
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.hexmesh import boundary_quads
+from upd.mesh.hexmesh import boundary_faces
 from upd.plot.matplotlib import Drawing, draw_sheet
 from upd.plot.style import COLOURS
 from upd.plot.surface import SCALE
@@ -91,9 +91,8 @@ def _together(meshes: Mapping[str, Mesh]) -> tuple[FloatArray, IntArray, IntArra
     """
     points = np.vstack([mesh.points for mesh in meshes.values()])
     first = np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])])
-    quads = [
-        boundary_quads(mesh) + start for mesh, start in zip(meshes.values(), first, strict=False)
-    ]
+    pairs = zip(meshes.values(), first, strict=False)
+    quads = [boundary_faces(mesh)[:, :4] + start for mesh, start in pairs]
     return points, np.vstack(quads), np.repeat(np.arange(len(quads)), [len(q) for q in quads])
 
 
@@ -121,7 +120,7 @@ def draw_meshes(meshes: Mapping[str, Mesh], title: str = "") -> Figure:
 
 def _looks(mesh: Mesh) -> bool | None:
     """Whether the contact on the body's surface looks up; None when it has none."""
-    sides = boundary_quads(mesh)
+    sides = boundary_faces(mesh)[:, :4]
     a, b, c, d = (mesh.points[sides[_touching(mesh)[sides].all(axis=1)][:, k]] for k in range(4))
     return bool(np.cross(c - a, d - b)[:, 2].sum() > 0.0) if len(a) else None
 

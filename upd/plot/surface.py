@@ -86,9 +86,9 @@ def read_surface(path: Path, names: Sequence[str], label: str = "") -> dict[str,
 
 def _side(points: FloatArray, hexes: IntArray) -> Side:
     # Pictures of modes draw the same faces.
-    from upd.mesh.hexmesh import boundary_quads
+    from upd.mesh.hexmesh import boundary_faces
 
-    quads = boundary_quads(Mesh(points, hexes))
+    quads = boundary_faces(Mesh(points, hexes))[:, :4]
     nodes, flat = np.unique(quads, return_inverse=True)
     q = flat.reshape(quads.shape)
     return nodes, points[nodes], np.vstack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]])

@@ -30,11 +30,8 @@ from upd.reference.half_space import love_rectangle_stress as love_rectangle_str
 from upd.reference.half_space import pressure_shift_rectangle as pressure_shift_rectangle
 from upd.reference.half_space import von_mises as von_mises
 from upd.reference.hertz import HertzPoint as HertzPoint
-from upd.reference.hertz import YieldPoint as YieldPoint
 from upd.reference.hertz import contact_modulus as contact_modulus
-from upd.reference.hertz import dundurs_alpha as dundurs_alpha
 from upd.reference.hertz import dundurs_beta as dundurs_beta
-from upd.reference.hertz import effective_radius as effective_radius
 from upd.reference.hertz import hertz_axial_displacement as hertz_axial_displacement
 from upd.reference.hertz import hertz_axis_stress as hertz_axis_stress
 from upd.reference.hertz import hertz_load as hertz_load
@@ -48,9 +45,7 @@ from upd.reference.hertz import punch_pressure as punch_pressure
 from upd.reference.hertz import sphere_gap as sphere_gap
 from upd.reference.hertz import sticking_part as sticking_part
 from upd.reference.mindlin import initial_tangential_stiffness as initial_tangential_stiffness
-from upd.reference.mindlin import shear_modulus as shear_modulus
 from upd.reference.mindlin import stick_radius as stick_radius
-from upd.reference.mindlin import stiffness_ratio as stiffness_ratio
 from upd.reference.mindlin import tangential_compliance_modulus as tangential_compliance_modulus
 from upd.reference.printed import THESIS_COMPRESSION as THESIS_COMPRESSION
 from upd.reference.printed import THESIS_CONTACT_STIFFNESS as THESIS_CONTACT_STIFFNESS
@@ -58,7 +53,6 @@ from upd.reference.printed import THESIS_FREQUENCIES as THESIS_FREQUENCIES
 from upd.reference.printed import THESIS_HERTZ as THESIS_HERTZ
 from upd.reference.printed import THESIS_STEEL as THESIS_STEEL
 from upd.reference.printed import THESIS_STIFFNESS as THESIS_STIFFNESS
-from upd.reference.printed import Printed as Printed
 from upd.reference.printed import printed_values as printed_values
 
 mindlin_cycle_energy = mindlin.cycle_energy

@@ -540,18 +540,18 @@ def den_hartog_phase(g: Real, friction: float) -> Real:
 
 
 def _stop_limit(g: float, U: float) -> float:
-    def negative(t: float) -> float:
-        return float(-_velocity_ratio(np.array([t]), g, U)[0])
-
     waves = max(1.0, 1.0 / g)
     n = int(np.ceil(_POINTS_PER_WAVE * waves))
     t = np.pi * np.arange(1, n) / n
     values = _velocity_ratio(t, g, U)
     best = int(np.argmax(values))
     low, high = np.pi * best / n, np.pi * (best + 2) / n
-    found = minimize_scalar(negative, bounds=(low, high), method="bounded")
+    found = minimize_scalar(
+        lambda t: -_velocity_ratio(t, g, U), bounds=(low, high), method="bounded"
+    )
     return max(1 / g**2, float(values[best]), float(-found.fun))
 
 
-def _velocity_ratio(t: FloatArray, g: float, U: float) -> FloatArray:
-    return np.asarray((U * (np.cos(t) - np.cos(t / g)) + np.sin(t / g) / g) / np.sin(t))
+def _velocity_ratio(t: Real, g: float, U: float) -> Real:
+    ratio: Real = (U * (np.cos(t) - np.cos(t / g)) + np.sin(t / g) / g) / np.sin(t)
+    return ratio

@@ -98,50 +98,6 @@ def contact_modulus(E1: float, nu1: float, E2: float, nu2: float) -> float:
     return 1 / compliance
 
 
-def effective_radius(R1: float, R2: float = np.inf) -> float:
-    """R from 1/R = 1/R1 + 1/R2.
-
-    Parameters
-    ----------
-    R1, R2 : float
-        mm; inf is a plane, a negative radius a hollow.
-
-    Returns
-    -------
-    float
-        mm.
-
-    Raises
-    ------
-    InputError
-        If the surfaces conform.
-
-    References
-    ----------
-    .. [1] K. L. Johnson, Contact Mechanics, section 4.2.
-
-    Examples
-    --------
-    >>> from upd.reference import effective_radius
-    >>> effective_radius(10.0, 10.0)
-    5.0
-    """
-    require(
-        R1 != 0 and R2 != 0,
-        "effective_radius",
-        f"a radius is zero (R1 = {R1}, R2 = {R2})",
-        "give the radii of curvature in mm",
-    )
-    curvature = 1 / R1 + 1 / R2
-    require(
-        curvature > 0,
-        "effective_radius",
-        f"1/R1 + 1/R2 = {curvature} is not positive",
-        "Hertz needs surfaces that diverge",
-    )
-    return 1 / curvature
-
-
 def hertz_sphere(load: Real, radius: float, E_star: float) -> HertzPoint[Real]:
     """Hertz contact of spheres: a = (3 F R / 4 E*)^(1/3), d = a^2/R, p0 = 2 a E*/(pi R).
 
@@ -320,20 +276,14 @@ def hertz_axial_displacement(z: Real, a: float, p0: float, E: float, nu: float) 
     elastic("hertz_axial_displacement", E, nu)
     depth = np.asarray(z, dtype=float) / a
     angle = np.arctan2(1.0, depth)
-    u: Real = plain((1 + nu) * p0 * a / E * ((1 - nu) * angle + nu * _arctan_defect(depth, angle)))
-    return u
-
-
-def _arctan_defect(depth: FloatArray, angle: FloatArray) -> FloatArray:
-    """(t - atan t)/t^2 with t = 1/depth.
-
-    By its series at small t, where the difference would cancel.
-    """
+    # (t - atan t)/t^2 with t = 1/depth: by its series at small t, where the difference would cancel
     deep = depth > 5
     t = 1 / np.where(deep, depth, np.inf)
     # terms fall by t^2 < 1/25 each: twelve reach machine accuracy
     series = sum((-1) ** k * t ** (2 * k + 1) / (2 * k + 3) for k in range(12))
-    return np.asarray(np.where(deep, series, depth - depth**2 * angle))
+    defect = np.where(deep, series, depth - depth**2 * angle)
+    u: Real = plain((1 + nu) * p0 * a / E * ((1 - nu) * angle + nu * defect))
+    return u
 
 
 def hertz_surface_displacement(r: Real, a: float, p0: float, E: float, nu: float) -> Real:
@@ -392,29 +342,6 @@ def dundurs_beta(E1: float, nu1: float, E2: float, nu2: float) -> float:
     """
     (s1, b1), (s2, b2) = _compliances(E1, nu1), _compliances(E2, nu2)
     return (b1 - b2) / (2 * (s1 + s2))
-
-
-def dundurs_alpha(E1: float, nu1: float, E2: float, nu2: float) -> float:
-    """Dundurs' alpha, plane strain: [(1-nu1)/G1 - (1-nu2)/G2] / [(1-nu1)/G1 + (1-nu2)/G2].
-
-    In (-1, 1). Sign as in Johnson: positive when body 1 is the more compliant (Dundurs' own sign is
-    the opposite).
-
-    Parameters
-    ----------
-    E1, nu1, E2, nu2 : float
-        MPa and Poisson ratios.
-
-    Returns
-    -------
-    float
-
-    References
-    ----------
-    .. [1] K. L. Johnson, Contact Mechanics, eq. (5.3a).
-    """
-    (s1, _), (s2, _) = _compliances(E1, nu1), _compliances(E2, nu2)
-    return (s1 - s2) / (s1 + s2)
 
 
 def _compliances(E: float, nu: float) -> tuple[float, float]:
@@ -492,22 +419,6 @@ def punch_pressure(r: Real, a: float, load: float) -> Real:
 # -- onset of yield --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class YieldPoint:
-    """Where a body under a Hertz contact is stressed most.
-
-    Attributes
-    ----------
-    ratio
-        Largest von Mises stress over the largest pressure p0.
-    depth
-        Of that place over the contact radius: on the axis, or 0 at the contact's edge.
-    """
-
-    ratio: float
-    depth: float
-
-
 def hertz_axis_stress(z: Real, a: float, p0: float, nu: float) -> tuple[Real, Real]:
     """Stresses on the axis of a Hertz contact: s_r = s_theta, and s_z.
 
@@ -543,7 +454,7 @@ def hertz_axis_stress(z: Real, a: float, p0: float, nu: float) -> tuple[Real, Re
     return plain(p0 * radial), plain(-p0 * fading)
 
 
-def hertz_yield_point(nu: float) -> YieldPoint:
+def hertz_yield_point(nu: float) -> tuple[float, float]:
     """The most stressed place under a Hertz contact.
 
     On the axis the von Mises stress is abs(s_r - s_z); at the contact's edge the surface is in pure
@@ -557,7 +468,10 @@ def hertz_yield_point(nu: float) -> YieldPoint:
 
     Returns
     -------
-    YieldPoint
+    ratio : float
+        Von Mises stress there over the largest pressure.
+    depth : float
+        Over the contact radius; 0 at the surface.
 
     References
     ----------
@@ -567,8 +481,8 @@ def hertz_yield_point(nu: float) -> YieldPoint:
     Examples
     --------
     >>> from upd.reference import hertz_yield_point
-    >>> found = hertz_yield_point(0.3)
-    >>> print(f"p0 = {1.0 / found.ratio:.3f} Y at {found.depth:.3f} a")
+    >>> ratio, depth = hertz_yield_point(0.3)
+    >>> print(f"p0 = {1.0 / ratio:.3f} Y at {depth:.3f} a")
     p0 = 1.613 Y at 0.481 a
     """
     elastic("hertz_yield_point", 1.0, nu)
@@ -580,11 +494,11 @@ def hertz_yield_point(nu: float) -> YieldPoint:
     # s_r - s_z rises from (1 - 2 nu) / 2 to one top and falls to zero from there
     top = minimize_scalar(lambda t: -difference(t), bounds=(0.0, 2.0), method="bounded")
     places = [
-        YieldPoint(difference(float(top.x)), float(top.x)),
-        YieldPoint(abs(1.0 - 2.0 * nu) / 2.0, 0.0),
-        YieldPoint(abs(1.0 - 2.0 * nu) / np.sqrt(3.0), 0.0),
+        (difference(float(top.x)), float(top.x)),
+        (abs(1.0 - 2.0 * nu) / 2.0, 0.0),
+        (abs(1.0 - 2.0 * nu) / np.sqrt(3.0), 0.0),
     ]
-    return max(places, key=lambda place: place.ratio)
+    return max(places, key=lambda place: place[0])
 
 
 def hertz_yield_load(yield_stress: float, nu: float, radius: float, E_star: float) -> float:
@@ -622,7 +536,7 @@ def hertz_yield_load(yield_stress: float, nu: float, radius: float, E_star: floa
     262 N
     """
     positive("hertz_yield_load", yield_stress=yield_stress)
-    p0 = yield_stress / hertz_yield_point(nu).ratio
+    p0 = yield_stress / hertz_yield_point(nu)[0]
     return float((p0 / hertz_sphere(1.0, radius, E_star).max_pressure) ** 3)
 
 

@@ -24,12 +24,6 @@ _SERIES_LIMIT = 0.25
 _SERIES_TERMS = 40
 
 
-def shear_modulus(E: float, nu: float) -> float:
-    """G = E / (2 (1 + nu)) (MPa)."""
-    elastic("shear_modulus", E, nu)
-    return E / (2 * (1 + nu))
-
-
 def tangential_compliance_modulus(E1: float, nu1: float, E2: float, nu2: float) -> float:
     """C = (2 - nu1)/G1 + (2 - nu2)/G2.
 
@@ -55,7 +49,9 @@ def tangential_compliance_modulus(E1: float, nu1: float, E2: float, nu2: float) 
     C = 0.0
     for E, nu in ((E1, nu1), (E2, nu2)):
         if not np.isposinf(E):
-            C += (2 - nu) / shear_modulus(E, nu)
+            elastic("tangential_compliance_modulus", E, nu)
+            G = E / (2 * (1 + nu))
+            C += (2 - nu) / G
     require(
         C > 0,
         "tangential_compliance_modulus",
@@ -211,7 +207,11 @@ def displacement(T: Real, mu: float, N: float, a: float, C: float) -> Real:
     0.2302 um if nothing slipped
     """
     positive("displacement", a=a, C=C)
-    d: Real = np.sign(T) * 3 * mu * N * C / (16 * a) * _slide(_ratio("displacement", T, mu, N))
+    q = _ratio("displacement", T, mu, N)
+    with np.errstate(divide="ignore"):  # log(0) at q = 1 is meant: exp(-inf) = 0
+        # 1 - (1 - q)^(2/3), without cancellation at small q
+        part = -np.expm1(2 / 3 * np.log1p(-q))
+    d: Real = np.sign(T) * 3 * mu * N * C / (16 * a) * part
     return d
 
 
@@ -312,7 +312,12 @@ def loop(T: FloatArray, mu: float, N: float, a: float, C: float) -> FloatArray:
             if turn == -direction:
                 reversals.append((last, d))
             direction = turn
-            _close(reversals, now, direction)
+            # forget the reversals of every loop the load has passed
+            while len(reversals) >= 2 and direction * (now - reversals[-2][0]) >= 0:
+                del reversals[-2:]
+            # the first branch meets the first-loading curve again at the opposite load
+            if len(reversals) == 1 and direction * (now + reversals[0][0]) >= 0:
+                reversals.clear()
             if reversals:
                 start, offset = reversals[-1]
                 d = offset + 2 * displacement((now - start) / 2, mu, N, a, C)
@@ -321,15 +326,6 @@ def loop(T: FloatArray, mu: float, N: float, a: float, C: float) -> FloatArray:
             last = now
         result[k] = d
     return result
-
-
-def _close(reversals: list[tuple[float, float]], now: float, direction: float) -> None:
-    """Forget the reversals of every loop the load has passed."""
-    while len(reversals) >= 2 and direction * (now - reversals[-2][0]) >= 0:
-        del reversals[-2:]
-    # the first branch meets the first-loading curve again at the opposite load
-    if len(reversals) == 1 and direction * (now + reversals[0][0]) >= 0:
-        reversals.clear()
 
 
 def cycle_energy(q: Real, mu: float, N: float, a: float, C: float) -> Real:
@@ -403,28 +399,6 @@ def initial_tangential_stiffness(a: Real, C: float) -> Real:
     return K
 
 
-def stiffness_ratio(nu: Real) -> Real:
-    """Initial tangential over normal stiffness of like materials: 2 (1 - nu)/(2 - nu).
-
-    With K_N = 2 a E*.
-
-    Parameters
-    ----------
-    nu : float or ndarray
-
-    Returns
-    -------
-    float or ndarray
-
-    References
-    ----------
-    .. [1] K. L. Johnson, Contact Mechanics, section 7.2.
-    """
-    elastic("stiffness_ratio", 1.0, nu)
-    ratio: Real = 2 * (1 - nu) / (2 - nu)
-    return ratio
-
-
 def _ratio(where: str, T: Real, mu: float, N: float) -> Real:
     """|T|/(mu N), refused above one."""
     positive(where, mu=mu, N=N)
@@ -440,13 +414,6 @@ def _ratio(where: str, T: Real, mu: float, N: float) -> Real:
     )
     q: Real = np.minimum(np.abs(T) / limit, 1.0)
     return q
-
-
-def _slide(q: Real) -> Real:
-    """1 - (1 - q)^(2/3), without cancellation at small q."""
-    with np.errstate(divide="ignore"):  # log(0) at q = 1 is meant: exp(-inf) = 0
-        s: Real = -np.expm1(2 / 3 * np.log1p(-q))
-    return s
 
 
 def _root(a: float, r: Real) -> Real:

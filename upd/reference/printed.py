@@ -95,14 +95,8 @@ class PrintedTable:
     case: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Printed:
-    """A printed value, in the unit of the number it is compared with."""
-
-    value: float
-    source: str
-
-
+#: a printed value, in the unit of the number it is compared with, and its source
+Printed = tuple[float, str]
 #: name of a number, fields of its case -> what was printed of it
 Lookup = Callable[[str, Mapping[str, Any]], tuple[Printed, ...]]
 
@@ -190,7 +184,7 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
     Examples
     --------
     >>> printed_values("wedge_platform", {}, [])("K_N_secant_raw", {"load": 154.7})
-    (Printed(value=1560000.0, source='thesis, Table XI'),)
+    ((1560000.0, 'thesis, Table XI'),)
     """
     bodies = list(materials)
     mine = [
@@ -206,10 +200,8 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
             if all(case.get(key, "") == value for key, value in table.case.items()):
                 for pattern, values in table.values.items():
                     if fnmatchcase(name, pattern):
-                        return tuple(
-                            Printed(v, table.source)
-                            for v in (values if isinstance(values, tuple) else (values,))
-                        )
+                        several = values if isinstance(values, tuple) else (values,)
+                        return tuple((v, table.source) for v in several)
         return ()
 
     return lookup

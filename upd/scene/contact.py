@@ -182,7 +182,7 @@ class Scene(SceneBase):
     @property
     def analysis(self) -> str:
         """Name of the analysis, which the recipe declares."""
-        return recipes.analysis(self.recipe)
+        return recipes.analyses(self.recipe)[0]
 
     @property
     def body_materials(self) -> Mapping[str, MaterialData]:

@@ -36,6 +36,9 @@ _AT_BOUND = 5e-4
 #: points of a curve
 _CURVE = 301
 _SIZE = (6.4, 4.8)
+_UNKNOWN_BESIDE = "Not known beside F_C/F_E {}: no whole curve reaches its end there."
+#: of a range of F_E
+_ENDS = ("lowest", "highest")
 #: at which bound F_C is
 _BOUNDS = {"at the lower bound": "lower", "at the upper bound": "upper"}
 #: values below and above, nan where they are not known
@@ -80,11 +83,6 @@ def curves_of(tried: Iterable[Tried]) -> int:
     return sum(rig.solved for one in tried for _, rig in one.rigs)
 
 
-def nominal_of(tried: Iterable[Tried]) -> Tried:
-    """The nominal optimum."""
-    return min(tried, key=lambda one: one.nominal.log_worst)
-
-
 def is_along(values: Sequence[float], others: Sequence[float], k: int) -> bool:
     """Whether values are the same but for one of them.
 
@@ -114,6 +112,8 @@ class BestDamper(FigureAnswer):
         Name of the contact stiffness.
     tried : tuple of Tried
         All places of what is chosen beside F_C, in their order.
+    best, plain : Tried
+        Of them the robust optimum, and the nominal one.
     refused : tuple of str
         Values that were not solved, with the reason.
     seconds : float
@@ -125,23 +125,24 @@ class BestDamper(FigureAnswer):
         Peak of the robust optimum with the scene's own values; nan where it is not known.
     nominal_at_worst : float
         Worst peak of the nominal optimum over all ranges; nan where it is not known.
+    curves, resumed : int
+        Whole curves that were solved in this call; points kept of earlier ones.
     """
 
     ranges: Ranges
     objective: Objective
     stiffness: str
     tried: tuple[Tried, ...]
+    best: Tried
+    plain: Tried
     refused: tuple[str, ...]
     seconds: float
     reaches: Mapping[str, tuple[Span, ...]]
     robust_at_nominal: float
     nominal_at_worst: float
+    curves: int
+    resumed: int
     figure = "choice"
-
-    @property
-    def best(self) -> Tried:
-        """The robust optimum."""
-        return best_of(self.tried)
 
     def along(self, k: int) -> list[tuple[float, Tried]]:
         """Values of one of the inputs chosen beside F_C and what was tried there, all others as at
@@ -156,11 +157,6 @@ class BestDamper(FigureAnswer):
         return sorted(found, key=lambda pair: pair[0])
 
     @property
-    def plain(self) -> Tried:
-        """The nominal optimum."""
-        return nominal_of(self.tried)
-
-    @property
     def centrifugal(self) -> float:
         """F_C of the robust optimum [N]."""
         return math.exp(self.best.best.log_centrifugal)
@@ -169,26 +165,6 @@ class BestDamper(FigureAnswer):
     def worst(self) -> float:
         """Its worst peak."""
         return math.exp(self.best.best.log_worst)
-
-    @property
-    def nominal_centrifugal(self) -> float:
-        """F_C of the nominal optimum [N]."""
-        return math.exp(self.plain.nominal.log_centrifugal)
-
-    @property
-    def nominal_peak(self) -> float:
-        """Its peak with the scene's own values."""
-        return math.exp(self.plain.nominal.log_worst)
-
-    @property
-    def curves(self) -> int:
-        """Whole curves that were solved in this call."""
-        return curves_of(self.tried)
-
-    @property
-    def resumed(self) -> int:
-        """Points kept of earlier calls."""
-        return sum(rig.resumed for one in self.tried for _, rig in one.rigs)
 
     @property
     def outcome(self) -> tuple[str, str]:
@@ -214,10 +190,11 @@ class BestDamper(FigureAnswer):
         unit, best = UNITS_OF[self.objective], self.best.best
         shapes = self.ranges.shapes
         robust = ("over the ranges", self.centrifugal, self.best.values)
-        nominal = ("the scene's values", self.nominal_centrifugal, self.plain.values)
+        plain, F = self.plain.nominal, math.exp(self.plain.nominal.log_centrifugal)
+        nominal = ("the scene's values", F, self.plain.values)
         heights = (
             (_height(self.worst), _height(self.robust_at_nominal)),
-            (_height(self.nominal_at_worst), _height(self.nominal_peak)),
+            (_height(self.nominal_at_worst), _height(math.exp(plain.log_worst))),
         )
         optima = tuple(
             (name, Rounded(F), *(of.cell(v) for of, v in zip(shapes, values, strict=True)), *both)
@@ -225,13 +202,13 @@ class BestDamper(FigureAnswer):
         )
         deciding = tuple(
             (
-                p.name,
-                Rounded(math.exp(best.log_centrifugal - p.s)),
-                Rounded(math.exp(p.s)),
-                Rounded(p.frequency, ".2f"),
-                Rounded(math.exp(p.y)),
+                name,
+                Rounded(math.exp(best.log_centrifugal - s)),
+                Rounded(math.exp(s)),
+                Rounded(frequency, ".2f"),
+                Rounded(math.exp(y)),
             )
-            for p in best.deciding
+            for s, y, name, frequency in best.deciding
         )
         moved = tuple(
             (
@@ -273,10 +250,12 @@ class BestDamper(FigureAnswer):
         )
         per = " per N of F_E" if self.objective == "peak" else ""
         kept = f", {self.resumed} kept of earlier calls" if self.resumed else ""
+        lost = self.best.worst.missed
         return (
             f"Right blade, {UNITS_OF['acceleration']}{per}, {e.start:g} to {e.stop:g} Hz, "
             f"stiffness {self.stiffness}{', over ' * bool(counted)}{counted}; {_mass(self)}.",
-            *warnings(self),
+            *(f"Not solved: {why}." for why in self.refused),
+            *([_UNKNOWN_BESIDE.format(lost)] if lost else []),
             f"{self.curves} whole curves by harmonic balance{kept}: {self.seconds:.1f} s.",
         )
 
@@ -304,33 +283,31 @@ def reaches_of(one: Tried, ranges: Ranges) -> dict[str, tuple[Span, ...]]:
     ranges
         Chosen, and counted over.
     """
-    worst, c, found = one.worst, one.best.log_centrifugal, {}
+    worst, c, nan = one.worst, one.best.log_centrifugal, math.nan
     limits = [one.best.log_worst + math.log(growth) for growth in GROWTHS]
+    found: dict[str, list[Sequence[float]]] = {}
     if ranges.pressing is not None:
         ends = [math.log(end) for end in one.ends]
-        found[ranges.pressing.path] = tuple(
-            _span(*(reached(lambda at: (worst, at), c, end, limit) for end in ends))
-            for limit in limits
-        )
+        found[ranges.pressing.path] = [
+            [reached(lambda at: (worst, at), c, end, limit) for end in ends] for limit in limits
+        ]
     low, high = worst.f
     for of in ranges.during:
         if of.path == FORCE:
-            (first, _), (last, _) = of.force_ends
-            lower = [
-                reached(lambda at: (worst.with_forces(at, high), c), low, low - REACH, limit)
+            lower, upper = (f"{of.path}, {word}" for word in _ENDS)
+            begin, end = low - REACH, high + REACH
+            found[lower] = [
+                (reached(lambda at: (worst.with_forces(at, high), c), low, begin, limit), nan)
                 for limit in limits
             ]
-            upper = [
-                reached(lambda at: (worst.with_forces(low, at), c), high, high + REACH, limit)
+            found[upper] = [
+                (nan, reached(lambda at: (worst.with_forces(low, at), c), high, end, limit))
                 for limit in limits
             ]
-            found[first] = tuple(_span(end, math.nan) for end in lower)
-            found[last] = tuple(_span(math.nan, end) for end in upper)
-    return found
-
-
-def _span(low: float, high: float) -> Span:
-    return math.exp(low), math.exp(high)
+    return {
+        path: tuple((math.exp(low), math.exp(high)) for low, high in spans)
+        for path, spans in found.items()
+    }
 
 
 # -- what moves it ---------------------------------------------------------------------------------
@@ -437,12 +414,13 @@ def _forces(found: BestDamper, one: InputRange) -> list[Sensitivity]:
     """Of both ends of the range of F_E, F_C as chosen."""
     worst, c = found.best.worst, found.best.best.log_centrifugal
     out = []
-    for k, (name, end) in enumerate(one.force_ends):
+    for k, (word, end) in enumerate(zip(_ENDS, (one.low, one.high), strict=True)):
         y = []
         for step in (-SLOPE_STEP, 0.0, SLOPE_STEP):
             moved = [f + step * (i == k) for i, f in enumerate(worst.f)]
             y.append(worst.with_forces(*moved).read(c))
         below, above = np.diff(y) / SLOPE_STEP
+        name = f"{one.path}, {word}"
         out.append(Sensitivity(name, end, below, above, found.reaches[name], "", one))
     return out
 
@@ -473,13 +451,11 @@ def _height(value: float) -> str:
 def _slopes(one: Sensitivity) -> str:
     """d ln(peak)/d ln(parameter), below and above where they differ."""
     same = math.isclose(one.below, one.above, abs_tol=5e-3) or not math.isfinite(one.above)
-    return " / ".join(map(_signed, (one.below,) if same else (one.below, one.above)))
-
-
-def _signed(value: float) -> str:
-    if not math.isfinite(value):
-        return "-"
-    return f"{value:+.2f}" if abs(value) >= 5e-3 else "0"
+    texts = []
+    for value in (one.below,) if same else (one.below, one.above):
+        signed = f"{value:+.2f}" if abs(value) >= 5e-3 else "0"
+        texts.append(signed if math.isfinite(value) else "-")
+    return " / ".join(texts)
 
 
 def _within(one: Sensitivity, ends: tuple[float, float]) -> str:
@@ -499,14 +475,6 @@ def _mass(found: BestDamper) -> str:
         if moved is None or moved.path == "damper.mass":
             return f"F_C = m r w^2 of {1e6 * mass:.4g} g"
     return "mass not known" if own is None else f"damper of {1e6 * own:.4g} g as meshed"
-
-
-def warnings(found: BestDamper) -> list[str]:
-    """What limits the answer."""
-    out = [f"Not solved: {why}." for why in found.refused]
-    if lost := found.best.worst.missed:
-        out.append(f"Not known beside F_C/F_E {lost}: no whole curve reaches its end there.")
-    return out
 
 
 # -- charts ---------------------------------------------------------------------------------------
@@ -530,8 +498,9 @@ def _over_centrifugal(found: BestDamper) -> Chart:
         return np.array([F_C if press is None else press.value_at(F_C, scene) for F_C in F])
 
     (F, robust), (G, plain) = (_curve(w, low, high) for w in (best.worst, found.plain.plain))
-    solved = np.array([math.log(found.centrifugal), math.log(found.nominal_centrifugal)])
-    at = shown(np.exp(solved))
+    solved = np.array([found.centrifugal, math.exp(found.plain.nominal.log_centrifugal)])
+    peaks = np.exp([best.best.log_worst, found.plain.nominal.log_worst])
+    at = shown(solved)
     name = "F_C" if press is None or press.path.endswith("centrifugal") else press.path
     return Chart(
         f"{scene.name}: worst peak",
@@ -540,8 +509,8 @@ def _over_centrifugal(found: BestDamper) -> Chart:
         traces=(
             Trace("over the ranges", shown(F), robust, "line", 0),
             Trace("the scene's own values", shown(G), plain, "dashed", 1),
-            Trace("robust optimum", at[:1], np.array([found.worst]), "star", 0, outline=True),
-            Trace("nominal optimum", at[1:], np.array([found.nominal_peak]), "star", 1),
+            Trace("robust optimum", at[:1], peaks[:1], "star", 0, outline=True),
+            Trace("nominal optimum", at[1:], peaks[1:], "star", 1),
         ),
         note="Between whole curves splines of their peaks.",
     )
@@ -560,8 +529,8 @@ def _over_ratio(found: BestDamper) -> Chart:
             traces.append(Trace(f"{name}{word}", x, y, "both", len(traces)))
     c, f = best.best.log_centrifugal, best.worst.f
     marks = tuple(
-        Mark(math.exp(p.s), math.exp(p.y), f"F_E {math.exp(c - p.s):.3g} N", 0)
-        for p in best.best.deciding
+        Mark(math.exp(s), math.exp(y), f"F_E {math.exp(c - s):.3g} N", 0)
+        for s, y, *_ in best.best.deciding
     )
     return Chart(
         "Peaks over F_C/F_E",

@@ -75,11 +75,6 @@ class InputRange:
         """Whether it changes F_C and nothing else."""
         return self.path == CENTRIFUGAL or self.path in TURNING
 
-    @property
-    def force_ends(self) -> tuple[tuple[str, float], tuple[str, float]]:
-        """Both ends of a range of F_E: names and values."""
-        return (f"{self.path}, lowest", self.low), (f"{self.path}, highest", self.high)
-
     def text(self, value: float) -> Any:
         """A value as a scene takes it."""
         return input_text(value, self.kind)
@@ -219,7 +214,16 @@ def _texts(given: str | Sequence[str] | Mapping[str, str]) -> list[str]:
 
 
 def _range(scene: ForcedScene, path: str, ends: str) -> InputRange:
-    kind, nominal = _input(scene, path)
+    if path == FORCE:
+        own = forces_of(scene)
+        kind, nominal = "force", math.exp(sum(map(math.log, own)) / len(own))
+    elif path == CENTRIFUGAL:
+        if scene.damper.speed is not None:
+            raise InputError("follows from mass, radius and speed here; choose one of those")
+        kind, nominal = "force", scene.damper.centrifugal
+    else:
+        keys = {key.path: key for key in scene_keys(scene)}
+        kind, nominal = scalar_input(scene, keys, path, (CENTRIFUGAL, FORCE))
     low, high = read_range(ends, kind, nominal)
     found = InputRange(path, kind, low, high, nominal)
     if path not in (FORCE, CENTRIFUGAL):
@@ -230,18 +234,6 @@ def _range(scene: ForcedScene, path: str, ends: str) -> InputRange:
             "give another range",
         )
     return found
-
-
-def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
-    """Kind and value of a scalar input."""
-    if path == FORCE:
-        return "force", math.exp(sum(map(math.log, forces_of(scene))) / len(forces_of(scene)))
-    if path == CENTRIFUGAL:
-        if scene.damper.speed is not None:
-            raise InputError("follows from mass, radius and speed here; choose one of those")
-        return "force", scene.damper.centrifugal
-    keys = {key.path: key for key in scene_keys(scene)}
-    return scalar_input(scene, keys, path, (CENTRIFUGAL, FORCE))
 
 
 # -- peaks of a rig over F_C/F_E -------------------------------------------------------------------

@@ -38,7 +38,6 @@ from upd.sizing.choice import (
     best_of,
     curves_of,
     is_along,
-    nominal_of,
     reaches_of,
 )
 from upd.sizing.ranges import InputRange, Ranges, bare, read_ranges, rig_peaks
@@ -164,9 +163,11 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> B
         raise ConvergenceError("; ".join(search.refused))
     for _ in range(_LOOKS):
         # whole curves on the way may show another optimum
-        tried = tuple(map(search.again, sorted(search.tried, key=lambda one: one.values)))
-        solved = curves_of(search.tried)
-        best, plain = best_of(tried), nominal_of(tried)
+        solved, tried = curves_of(search.tried), list[Tried]()
+        for one in sorted(search.tried, key=lambda one: one.values):
+            robust, nominal = (lowest_worst(worst, *one.ends) for worst in (one.worst, one.plain))
+            tried.append(replace(one, best=robust, nominal=nominal))
+        best, plain = best_of(tried), min(tried, key=lambda one: one.nominal.log_worst)
         with search.stages("search", "how far the optimum reaches"):
             reaches = reaches_of(best, ranges)
             here = best.plain.solved(best.best.log_centrifugal)
@@ -178,25 +179,22 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> B
         ranges,
         objective,
         search.stiffness,
-        tried,
+        tuple(tried),
+        best,
+        plain,
         tuple(search.refused),
         time.perf_counter() - begin,
         reaches,
         math.exp(here),
         math.exp(there),
+        curves_of(tried),
+        sum(rig.resumed for one in tried for _, rig in one.rigs),
     )
 
 
 def _with(place: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
     """A place with one of its values changed."""
     return (*place[:k], value, *place[k + 1 :])
-
-
-def _grid(shape: InputRange) -> list[float]:
-    values = list(np.linspace(shape.low, shape.high, GRID))
-    if shape.low < shape.nominal < shape.high:
-        values.append(shape.nominal)
-    return sorted(set(values))
 
 
 class _Search:
@@ -246,8 +244,9 @@ class _Search:
         for turn in range(_TURNS if len(shapes) > 1 else 1):
             before = best_of(self.tried) if self.tried else None
             for k, shape in enumerate(shapes):
-                for value in _grid(shape) if turn == 0 else ():
-                    self.at(_with(place, k, value))
+                grid = {*np.linspace(shape.low, shape.high, GRID), place[k]} if turn == 0 else ()
+                for value in sorted(grid):
+                    self.at(_with(place, k, float(value)))
                 if not self.tried:
                     continue
                 self._closer(k)
@@ -307,11 +306,6 @@ class _Search:
         with self.stages("search", self._words(chosen)):
             best, nominal = (lowest_worst(one, *ends) for one in (worst, plain))
         return Tried(place, tuple(rigs.items()), worst, best, plain, nominal, ends)
-
-    def again(self, one: Tried) -> Tried:
-        """The optima of a place on all whole curves that are known by now."""
-        best, nominal = (lowest_worst(worst, *one.ends) for worst in (one.worst, one.plain))
-        return replace(one, best=best, nominal=nominal)
 
     def _rig(self, given: Inputs, window: tuple[float, float]) -> PeaksOver:
         words, scene = self._words(given), self._with(given)

@@ -9,7 +9,7 @@ count beside F_C, and the blades move in the plane of the slopes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,7 +35,7 @@ from upd.contact.rigid_damper import (
 )
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
-from upd.mesh import Mesh, recipes
+from upd.mesh import recipes
 from upd.plot.answer_table import AnswerTable, Rounded
 from upd.plot.chart import Axis, Band, Chart, Map, Trace
 from upd.report.answer import FigureAnswer
@@ -95,19 +95,7 @@ def scene_damper(scene: AnyScene) -> tuple[DamperSection, float]:
     of: Any = scene
     material = Material(of.material.E, of.material.nu, of.damper.density or of.material.density)
     body = mass_properties(meshes["damper"], material)
-    return section_of(meshes, body.centre), body.mass
-
-
-def section_of(meshes: Mapping[str, Mesh], centre: Array) -> DamperSection:
-    """Faces of a damper from the patches of the blades' meshes.
-
-    Parameters
-    ----------
-    meshes
-        "left" and "right" with their faces "patch".
-    centre : (3,) ndarray
-        The damper's centre of mass, mm.
-    """
+    # from the patches of the blades' meshes
     frames = np.stack([patch_frame(meshes[side]) for side in SIDES])
     faces = []
     for side, frame, angle in zip(SIDES, frames, face_angles(frames), strict=True):
@@ -115,9 +103,9 @@ def section_of(meshes: Mapping[str, Mesh], centre: Array) -> DamperSection:
         points = mesh.points[np.unique(mesh.faces["patch"][:, :4])] @ frame.T
         low, high = points[:, 2].min(), points[:, 2].max()
         middle = (0.5 * (low + high) * frame[2] + points[:, 0].mean() * frame[0])[_ACROSS]
-        x, z = middle - np.asarray(centre)[_ACROSS]
+        x, z = middle - np.asarray(body.centre)[_ACROSS]
         faces.append(FaceSection(angle, (float(x), float(z)), 0.5 * float(high - low)))
-    return DamperSection(*faces)
+    return DamperSection(*faces), body.mass
 
 
 @dataclass(frozen=True)
@@ -234,7 +222,7 @@ class DamperDesign(FigureAnswer):
         )
         # a damper that jams or lifts off is not followed further
         friction = tuple((what, _number(mu, "not before", ".4g")) for what, mu in limits)
-        motions = tuple((one.motion.name, *_forces(one), _outcome(one)) for one in self.states)
+        motions = tuple(map(_motion, self.states))
         bounds = tuple(
             (side, *(_number(v, "no limit") for v in self.force_limits[:, k].ravel()))
             for k, side in enumerate(SIDES)
@@ -442,22 +430,21 @@ def _number(value: float, infinite: str, digits: str = ".5g") -> str:
     return Rounded(value, digits, "{}" if math.isfinite(value) else infinite)
 
 
-def _forces(state: MotionState) -> list[str]:
-    """N and T of both faces, and how far off the middle of a face they must act."""
-    if not math.isfinite(state.N[0]):
-        return ["-"] * 5
-    pairs = zip(state.N, state.T, strict=True)
-    # what cancels to rounding is nothing
-    small = 1e-9 * float(state.N.max())
-    forces = [Rounded(v if abs(v) > small else 0.0, ".5g") for pair in pairs for v in pair]
-    return [*forces, Rounded(100.0 * state.eccentricity, ".0f", "{} %")]
-
-
-def _outcome(state: MotionState) -> str:
+def _motion(state: MotionState) -> tuple[str, ...]:
+    """Its name, N and T of both faces, how far off the middle of a face they must act, and what
+    the damper does.
+    """
+    forces = ["-"] * 5
+    if math.isfinite(state.N[0]):
+        # what cancels to rounding is nothing
+        small = 1e-9 * float(state.N.max())
+        pairs = zip(state.N, state.T, strict=True)
+        forces = [Rounded(v if abs(v) > small else 0.0, ".5g") for pair in pairs for v in pair]
+        forces.append(Rounded(100.0 * state.eccentricity, ".0f", "{} %"))
     stuck = [side for side, s in zip(SIDES, state.slides, strict=True) if s == 0.0]
-    if state.outcome == OUTCOMES[JAMS] or len(stuck) != 1:
-        return state.outcome
-    return f"{state.outcome}, {stuck[0]} face does not slide"
+    one = len(stuck) == 1 and state.outcome != OUTCOMES[JAMS]
+    note = f", {stuck[0]} face does not slide" if one else ""
+    return state.motion.name, *forces, f"{state.outcome}{note}"
 
 
 # -- charts ---------------------------------------------------------------------------------------

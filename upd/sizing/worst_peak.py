@@ -108,13 +108,6 @@ class PeaksOver:
         around = zip([-math.inf, *s], s, [*s[1:], math.inf], strict=False)
         return [(a, c) for a, b, c in around if not self.points[b]]
 
-    def near(self, s: float) -> tuple[str, float]:
-        """Name and frequency [Hz] of the highest peak of the nearest whole curve."""
-        told = [t for t, peaks in self.points.items() if peaks]
-        peaks = self.points[min(told, key=lambda t: abs(t - s))] or {}
-        name = max(peaks, key=lambda one: peaks[one][1])
-        return name, peaks[name][0]
-
     def read(self, s: Array) -> Array:
         """ln of the highest peak at places (n,); nan where it is not known."""
         nodes = sorted(t for t, peaks in self.points.items() if peaks)
@@ -142,22 +135,9 @@ class PeaksOver:
         return out
 
 
-@dataclass(frozen=True)
-class Deciding:
-    """A place that decides a worst peak.
-
-    Attributes
-    ----------
-    s, y : float
-        ln(F_C/F_E), ln of the height per unit of F_E.
-    name, frequency : str, float
-        Of the peak [Hz].
-    """
-
-    s: float
-    y: float
-    name: str
-    frequency: float
+#: a place that decides a worst peak: s = ln(F_C/F_E) and ln of the height per unit of F_E there,
+#: name and frequency [Hz] of the peak
+Deciding = tuple[float, float, str, float]
 
 
 class WorstPeak:
@@ -227,7 +207,12 @@ class WorstPeak:
             counted = y - self.weight * s
             for k in {0, len(s) - 1, int(np.nanargmax(counted))}:
                 if counted[k] >= worst - NEAR:
-                    at = Deciding(float(s[k]), float(y[k]), *one.near(float(s[k])))
+                    place = float(s[k])
+                    # the highest peak of the nearest whole curve
+                    told = [t for t, peaks in one.points.items() if peaks]
+                    peaks = one.points[min(told, key=lambda t: abs(t - place))] or {}
+                    name = max(peaks, key=lambda peak: peaks[peak][1])
+                    at = place, float(y[k]), name, peaks[name][0]
                     found.append((float(counted[k]), one, at))
         return [pair for _, *pair in sorted(found, key=lambda p: -p[0])]  # type: ignore[misc]
 
@@ -236,10 +221,10 @@ class WorstPeak:
         too far apart, the more so beside what decides: a branch may end there. Whether any was new.
         """
         deciding = self.deciding(c)
-        new = [one.look(at.s) for one, at in deciding]
+        new = [one.look(s) for one, (s, *_) in deciding]
         low, high = c - self.f[1], c - self.f[0]
         for one in self.peaks:
-            places = [at.s for of, at in deciding if of is one]
+            places = [s for of, (s, *_) in deciding if of is one]
             for a, b in pairwise(sorted(one.points)):
                 beside = any(a - CLOSE <= s <= b + CLOSE for s in places)
                 step = BRANCH_STEP if beside else ANSWER_STEP
@@ -307,17 +292,13 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
         if not worst.solve(c):
             break
     deciding = tuple(at for _, at in worst.deciding(c))
-    return LowestWorst(c, worst.read(c), deciding, _status(values, i))
-
-
-def _status(values: Array, i: int) -> str:
-    """Of the lowest of worst peaks over F_C."""
     last = len(values) - 1
+    status = {0: "at the lower bound", last: "at the upper bound"}.get(i, "found")
     if last == 0:
-        return "found"
-    if np.isnan(values[max(i - 1, 0) : i + 2]).any():
-        return "beside what is not known"
-    return {0: "at the lower bound", last: "at the upper bound"}.get(i, "found")
+        status = "found"
+    elif np.isnan(values[max(i - 1, 0) : i + 2]).any():
+        status = "beside what is not known"
+    return LowestWorst(c, worst.read(c), deciding, status)
 
 
 def reached(

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -97,9 +98,10 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
             ladders.setdefault(one.point.source, []).append(one)
         for curve, points in ladders.items():
             most = max(p.outcome.n_dof for p in points)
-            others = [_finest(them) for name, them in ladders.items() if name != curve]
+            others = (them for name, them in ladders.items() if name != curve)
+            finest = (min(them, key=lambda p: p.point.size) for them in others)
             finer = max(
-                (one for one in others if one.outcome.n_dof > most),
+                (one for one in finest if one.outcome.n_dof > most),
                 key=lambda p: p.outcome.n_dof,
                 default=None,
             )
@@ -112,10 +114,6 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
 def _with(points: Iterable[SolvedPoint], key: Key) -> list[SolvedPoint]:
     """The points that have the number."""
     return [one for one in points if np.isfinite(one.values.get(key, np.nan))]
-
-
-def _finest(points: Sequence[SolvedPoint]) -> SolvedPoint:
-    return min(points, key=lambda p: p.point.size)
 
 
 def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
@@ -167,7 +165,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
         reference, against = np.array(own[:1]), "its own extrapolation"
     else:
         clear = len(h) < 3
-        reference = np.array([_finest(points).values[key]])
+        reference = values[[np.argmin(h)]]
         against = "finest level" if clear else "finest level, no clear order"
     error = values / reference - 1.0
     # An error that changes sign on the way scatters.
@@ -311,23 +309,20 @@ def points_table(
     def text(key: Key, one: SolvedPoint) -> str:
         return f"{one.values[key]:.5g}" if key in one.values else ""
 
-    def difference(one: SolvedPoint) -> str:
-        return percent((errors or {}).get((one.point.source, one.point.label)))
-
-    numbers: list[TableColumn] = [
-        (f"# {_head(name, case.label)}", partial(text, (name, case))) for name, case in keys
-    ]
-    more = [("# difference", difference)] if errors else []
+    numbers: list[TableColumn] = []
+    for name, case in keys:
+        # label, case and unit, one below the other
+        unit = quantity_of(name)[0].unit
+        parts = number_label(name), case.label, f"[{unit_label(unit)}]" if unit else ""
+        head = "\n".join(filter(None, parts))
+        numbers.append((f"# {head}", partial(text, (name, case))))
+    known, more = errors or {}, list[TableColumn]()
+    if known:
+        at = attrgetter("point.source", "point.label")
+        more.append(("# difference", lambda one: percent(known.get(at(one)))))
     # what a narrow terminal leaves out first stands last
     columns = (*_POINTS[:2], *numbers[:1], *more, *_POINTS[2:5], *numbers[1:], _POINTS[5])
     return make_table("Levels", columns, solved)
-
-
-def _head(name: str, case: str) -> str:
-    """Label of a number, its case and unit, one below the other."""
-    unit = quantity_of(name)[0].unit
-    parts = number_label(name), case, f"[{unit_label(unit)}]" if unit else ""
-    return "\n".join(filter(None, parts))
 
 
 def convergence_tables(
@@ -380,11 +375,14 @@ def enough(curves: Sequence[ConvergenceCurve]) -> tuple[str, ...]:
         return ()
     mine, at = _main(curves), dict[str, float]()
     for limit in _WANTED:
-        levels = [
-            (c.seconds[k], f"{c.curve} " * (len(mine) > 1) + c.labels[k], c.error[k])
-            for c in mine
-            if (k := _first_within(c, limit)) < len(c.error)
-        ]
+        levels = []
+        for c in mine:
+            # the first level from which on all stay within the limit
+            within = np.append(np.abs(c.error[::-1]) <= limit, False)
+            k = len(c.error) - int(np.argmin(within))
+            if k < len(c.error):
+                name = f"{c.curve} " * (len(mine) > 1) + c.labels[k]
+                levels.append((c.seconds[k], name, c.error[k]))
         for seconds, level, error in sorted(levels)[:1]:
             at[f"{level} is enough for {{}}: {100 * abs(error):.2g} % in {seconds:.2g} s"] = limit
     found = [text.format(f"{100 * limit:g} %") for text, limit in at.items()]
@@ -394,12 +392,6 @@ def enough(curves: Sequence[ConvergenceCurve]) -> tuple[str, ...]:
     orders = [f"{c.curve} {c.order:.1f}" for c in mine if np.isfinite(c.order)]
     text = f"{what} against {mine[0].against}: {'; '.join(found) or none}. Order of convergence: "
     return (f"{text[:1].upper()}{text[1:]}{', '.join(orders) or 'none is clear'}.",)
-
-
-def _first_within(curve: ConvergenceCurve, limit: float) -> int:
-    """The first level from which on all stay within the limit; their number where none does."""
-    within = np.abs(curve.error[::-1]) <= limit
-    return len(within) - int(np.argmin(np.append(within, False)))
 
 
 def level_table(

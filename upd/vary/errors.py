@@ -51,7 +51,7 @@ def estimate(
             run = replace(run, samples=problem.sample(solution))
     parts = list[Estimates]()
     for source, levels in solved.items():
-        half = partial(half_cost, problem, plan, source, run.seconds)
+        half = cache(partial(half_cost, problem, plan, source, run.seconds))
         parts.append(source_estimates(source, run, levels, half))
     return problem.corrected(solution, numbers, merged(*parts))
 
@@ -89,7 +89,7 @@ def estimate_in_round(
         memo.append(run)
     if not coarser:
         return estimate(problem, solution, numbers, stages) if problem.varies_lowest else None
-    half = partial(half_cost, problem, solution.plan, level.source, seconds)
+    half = cache(partial(half_cost, problem, solution.plan, level.source, seconds))
     found = source_estimates(level.source, run, coarser, half)
     return problem.corrected(solution, numbers, found)
 
@@ -98,7 +98,7 @@ def source_estimates(
     source: str,
     run: SolvedVariation,
     levels: Sequence[SolvedVariation],
-    half: Callable[[float], float],
+    half: Callable[[float], tuple[float | None, str]],
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers.
 
@@ -109,8 +109,8 @@ def source_estimates(
     levels
         Its variations, the finest of coarser ones first; or why there are none.
     half
-        Order of convergence -> seconds that a level with half the error adds. InputError where
-        there is no such level.
+        Order of convergence -> seconds that a level with half the error adds, or None and why there
+        is no such level.
 
     Returns
     -------
@@ -119,7 +119,6 @@ def source_estimates(
     """
     known = [one for one in levels if not one.reason]
     faults = "; ".join(one.reason for one in levels if one.reason)
-    seconds_of_half = cache(partial(_or_reason, half))
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     for number in run.numbers:
         key = number.name, number.case
@@ -128,9 +127,7 @@ def source_estimates(
             continue
         found = bound(key, run, known)
         if math.isfinite(found.error):
-            cost, why = seconds_of_half(
-                found.order if 0.0 < found.order < math.inf else found.falls
-            )
+            cost, why = half(found.order if 0.0 < found.order < math.inf else found.falls)
             part = ErrorPart(source, found.error, found.basis, cost, why)
         else:
             part = ErrorPart(source, math.nan, found.basis or faults or _LACKING)
@@ -168,18 +165,15 @@ def bound(key: Key, run: SolvedVariation, levels: Sequence[SolvedVariation]) -> 
     return replace(found, basis=f"against {labels}: {found.basis}")
 
 
-def half_cost(problem: Problem, plan: Any, source: str, seconds: float, order: float) -> float:
-    """Seconds that half of an error of the order adds to a run of so many. Raises InputError."""
+def half_cost(
+    problem: Problem, plan: Any, source: str, seconds: float, order: float
+) -> tuple[float | None, str]:
+    """Seconds that half of an error of the order adds to such a run, or why there are none."""
     factor = 2.0 ** (1.0 / order)
-    finer = Variation(source, "", problem.finer(plan, source, factor), 1.0 / factor)
-    own = predicted_seconds(problem, plan, RUN)
-    return max(0.0, seconds * (predicted_seconds(problem, plan, finer) / own - 1.0))
-
-
-def _or_reason(half: Callable[[float], float], order: float) -> tuple[float | None, str]:
-    """Seconds of half an error, or why there are none."""
     try:
-        return half(order), ""
+        finer = Variation(source, "", problem.finer(plan, source, factor), 1.0 / factor)
+        own = predicted_seconds(problem, plan, RUN)
+        return max(0.0, seconds * (predicted_seconds(problem, plan, finer) / own - 1.0)), ""
     except InputError as error:
         return None, one_line(error)
 

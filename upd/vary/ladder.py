@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from upd.errors import InputError
@@ -55,16 +56,16 @@ class StudyReport:
 Reporter = Callable[[Any, Sequence[SolvedPoint], Sequence[str]], StudyReport]
 
 
-def limit_report(scene: object, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
-    """Errors against what each number converges to."""
-    del scene
-    return _convergence(solved, make_curves(solved, names))
-
-
-def finest_report(
-    scene: object, solved: Sequence[SolvedPoint], names: Sequence[str]
+def convergence_report(
+    scene: object, solved: Sequence[SolvedPoint], names: Sequence[str], *, finest: bool = False
 ) -> StudyReport:
-    """Changes from the last level, of levels that are no sizes, below the numbers of all levels."""
+    """Errors against what each number converges to.
+
+    Parameters
+    ----------
+    finest
+        Whether the levels are no sizes: then changes from the last one, below the numbers of all.
+    """
     del scene
     keys = with_friction(matching(solved, names))
 
@@ -72,16 +73,14 @@ def finest_report(
         failed = "failed" * bool(one.outcome.failure)
         return f"{one.values[key]:.5g}" if key in one.values else failed
 
-    levels = level_table("Numbers of every level", keys, solved, text)
-    return _convergence(solved, finest_curves(solved, names), levels)
-
-
-def _convergence(
-    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: AnswerTable
-) -> StudyReport:
+    before = [level_table("Numbers of every level", keys, solved, text)] if finest else []
+    curves = (finest_curves if finest else make_curves)(solved, names)
     levels, errors = convergence_tables(solved, curves)
     notes = enough(curves)
     return StudyReport((*before, levels), bool(curves), notes, tuple(curves), details=(errors,))
+
+
+finest_report = partial(convergence_report, finest=True)
 
 
 def accuracy_report(
@@ -133,7 +132,7 @@ class Ladder:
 
     variations: Callable[[Any, Asked], Iterable[Variation]]
     follow: tuple[str, ...] = ()
-    report: Reporter = limit_report
+    report: Reporter = convergence_report
     notes: Callable[[Any], Iterable[str]] = lambda scene: ()
     title: Callable[[Any, str], str] = lambda scene, vary: f"what accuracy costs, {vary}"
     applies: Callable[[Any], bool] = lambda scene: True
@@ -192,11 +191,12 @@ def whole_levels(asked: Asked, least: int, what: str = "whole numbers", step: in
     """The levels as whole numbers, rising; empty where none are given. Raises InputError."""
     if asked is None:
         return []
-
-    def allowed(n: float) -> bool:
-        return math.isfinite(n) and n >= least and n % step == 0
-
-    return [int(n) for n in chosen_levels(asked, allowed, f"{what}, {least} or more")]
+    good = chosen_levels(
+        asked,
+        lambda n: math.isfinite(n) and n >= least and n % step == 0,
+        f"{what}, {least} or more",
+    )
+    return [int(n) for n in good]
 
 
 def refinements(asked: Asked) -> list[float]:

@@ -108,20 +108,17 @@ def coarser_rigs(problem: Problem, plan: Any) -> list[Variation] | str:
     made: list[Variation] = []
     for part in () if refinement(plan.scene) is None else REFINED:
         overrides = refined(plan.scene, part)
-        one = Variation(MESH, f"geometry.refine = {overrides[0][1]:.2g}", overrides)
+        level = Variation(MESH, f"geometry.refine = {overrides[0][1]:.2g}", overrides)
         try:
-            coarse = varied_plan(problem, plan.scene, one)
+            coarse = varied_plan(problem, plan.scene, level)
         except InputError:
             # As coarse as it can be.
             continue
-        size = (_hexes(plan) / _hexes(coarse)) ** (1.0 / 3.0)
-        if size > max((level.size for level in made), default=1.0):
-            made.append(replace(one, size=size))
+        fine, few = (sum(n["hexes"] for n in one.size.values()) for one in (plan, coarse))
+        size = (fine / few) ** (1.0 / 3.0)
+        if size > max((one.size for one in made), default=1.0):
+            made.append(replace(level, size=size))
     return made or "the rig cannot be meshed coarser: its recipe has no smaller refinement"
-
-
-def _hexes(plan: Any) -> int:
-    return sum(count["hexes"] for count in plan.size.values())
 
 
 def _numbers(

@@ -87,7 +87,7 @@ def test_declared_distant_sets_are_those_of_the_mesh(recipe: str) -> None:
         body: {n.removeprefix("distant_") for n in mesh.nodes if n.startswith("distant_")}
         for body, mesh in meshes.items()
     }
-    declared = recipes.distant_sets(recipe, parameters)
+    declared = recipes.sets_of(recipe, parameters, "DISTANT")
     assert {body: set(names) for body, names in declared.items()} == made
 
 
@@ -186,7 +186,7 @@ def test_declared_sets_with_weights_are_those_of_the_mesh(recipe: str) -> None:
     parameters = make_plan(load_scene(scene[recipe])).parameters
     meshes, _ = recipes.build_mesh(recipe, parameters)
     made = {body: set(mesh.weights) for body, mesh in meshes.items() if mesh.weights}
-    declared = recipes.weighted_sets(recipe, parameters)
+    declared = recipes.sets_of(recipe, parameters, "WEIGHTED")
     assert {body: set(names) for body, names in declared.items()} == made
 
 

@@ -28,7 +28,7 @@ from upd.vary.curves import (
     make_curves,
     markdown_table,
 )
-from upd.vary.ladder import accuracy_report, limit_report
+from upd.vary.ladder import accuracy_report, convergence_report
 from upd.vary.outcome import Outcome, SolvedPoint, read_outcome
 from upd.vary.variation import Variation
 
@@ -329,7 +329,7 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
         )
         for h in (2.0, 1.0, 0.5)
     ]
-    report = limit_report(None, levels, ["peak_1_frequency"])
+    report = convergence_report(None, levels, ["peak_1_frequency"])
     console = Console(width=100, file=io.StringIO())
     print_table(console, report.details[0])
     printed = console.file.getvalue()  # type: ignore[attr-defined]

@@ -198,15 +198,15 @@ def test_further_measurements_are_ranked_by_what_they_leave(
     targets = read_targets(to)
     residuals = Residuals(FitResponses(scene, targets, parameters, like=like))
     none = np.zeros(2)
-    found = {one.name: one for one in rank_measurements(residuals, none)}
-    best = next(iter(found.values()))
-    assert best.then == min(one.then for one in found.values())
-    one = found["stuck_out_of_phase"]
+    today, ranked = rank_measurements(residuals, none)
+    widest = [then for _, _, then in ranked]
+    assert widest == sorted(widest) and widest[-1] <= today
+    ((one, then),) = [(m, then) for m, _, then in ranked if m.name == "stuck_out_of_phase"]
     both = read_targets(f"{to},stuck_out_of_phase=430 Hz +- {one.half_width!r} Hz")
     J = Residuals(FitResponses(scene, both, parameters, like=like)).jacobian(none)
     room = np.log(10.0) * np.eye(2)
     left = np.linalg.inv(J.T @ J + np.linalg.inv(room @ room))
-    assert np.log(one.then) == pytest.approx(np.sqrt(np.linalg.eigvalsh(left)[-1]), rel=1e-6)
+    assert np.log(then) == pytest.approx(np.sqrt(np.linalg.eigvalsh(left)[-1]), rel=1e-6)
 
 
 def test_contact_totals_and_curves_weigh_together(scene: ForcedScene, like: FitResponses) -> None:

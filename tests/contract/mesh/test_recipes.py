@@ -330,10 +330,6 @@ def test_library_does_not_load_gmsh_before_it_meshes() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_gmsh_version_is_told() -> None:
-    assert recipes.gmsh_version()[0].isdigit()
-
-
 def test_a_module_that_a_recipe_imports_is_part_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
-from upd.mesh.hexmesh import boundary_quads
+from upd.mesh.hexmesh import boundary_faces
 from upd.plot.matplotlib import draw_sheet, write_png
 from upd.plot.pictures import draw_mode
 
@@ -54,7 +54,7 @@ def collections(ax: Axes) -> tuple[PolyCollection, LineCollection]:
 @pytest.mark.parametrize("nodes", [8, 20, 27])
 def test_boundary_is_closed_and_looks_outwards(nodes: int) -> None:
     mesh = box(nodes)
-    quads = boundary_quads(mesh)
+    quads = boundary_faces(mesh)[:, :4]
     assert len(quads) == 2 * (2 * 3 + 3 * 4 + 4 * 2)
     a, b, c, d = (mesh.points[quads[:, k]] for k in range(4))
     area = 0.5 * np.cross(c - a, d - b)
@@ -65,7 +65,7 @@ def test_boundary_is_closed_and_looks_outwards(nodes: int) -> None:
 
 
 def test_boundary_of_one_hexahedron() -> None:
-    assert len(boundary_quads(box(8, (1, 1, 1)))) == 6
+    assert len(boundary_faces(box(8, (1, 1, 1)))) == 6
 
 
 def test_only_sides_to_the_viewer_are_drawn_far_ones_first() -> None:

@@ -359,17 +359,17 @@ def _hertz_stress(
     scene, hertz = solution.plan.scene, solution.hertz_of(force)
     material, radius = scene.materials[body], scene.sphere_radius
     assert hertz is not None and radius is not None and material.yield_stress is not None
-    worst = hertz_yield_point(material.nu)
+    worst, depth = hertz_yield_point(material.nu)
     if case.ratio is None:
-        stress = worst.ratio * hertz.max_pressure
+        stress = worst * hertz.max_pressure
         begins = hertz_yield_load(material.yield_stress, material.nu, radius, solution.modulus)
         return stress, (
-            f"Hertz without friction: {stress:.4g} MPa at depth {worst.depth * hertz.radius:.3g} "
+            f"Hertz without friction: {stress:.4g} MPa at depth {depth * hertz.radius:.3g} "
             f"mm; yields from {begins:.4g} N"
         )
     ratio = partial_slip_ratio(scene.contact.friction, case.ratio, material.nu)
     # friction never relieves the most stressed place
-    stress = max(ratio, worst.ratio) * hertz.max_pressure
+    stress = max(ratio, worst) * hertz.max_pressure
     return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
 
 

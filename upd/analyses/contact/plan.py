@@ -311,7 +311,7 @@ def refined_growth(growth: float, ratio: float) -> float:
 def require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[str]) -> None:
     """Raise InputError for a body or a node set of contact.distant that is not there."""
     chosen, problems = scene.contact.distant, []
-    known = recipes.distant_sets(scene.recipe, parameters) if chosen else {}
+    known = recipes.sets_of(scene.recipe, parameters, "DISTANT") if chosen else {}
     for body, name in chosen.items():
         if body not in set(bodies):
             problem = f"no such body; the recipe makes {', '.join(bodies)}"
@@ -429,7 +429,7 @@ def contact_plan(
     if recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is reported before anything is written.
         require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
-    _add_bodies(cost, families, recipes.weighted_sets(scene.recipe, parameters))
+    _add_bodies(cost, families, recipes.sets_of(scene.recipe, parameters, "WEIGHTED"))
     _add_loads(cost, scene, on)
     # The internal displacement takes the factors of all bodies again.
     needs = cost.in_a_row(keep="internal displacement" in on)

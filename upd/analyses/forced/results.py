@@ -330,9 +330,9 @@ def _with_measured_peaks(solution: ForcedSolution, results: Sequence[Result]) ->
             curves.setdefault(replace(one.case, mode=""), []).append(k)
     for case, mine in curves.items():
         # under this name they are printed: which of a run's peaks each is stands nowhere
-        for found in look_up(q.FREE_PEAK_FREQUENCY.name, case.given()):
-            k = min(mine, key=lambda k: abs(out[k].value - found.value))
-            out[k] = replace(out[k], reference=found.value, source=found.source, exact=False)
+        for value, source in look_up(q.FREE_PEAK_FREQUENCY.name, case.given()):
+            k = min(mine, key=lambda k: abs(out[k].value - value))
+            out[k] = replace(out[k], reference=value, source=source, exact=False)
     return out
 
 
