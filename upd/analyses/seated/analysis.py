@@ -15,7 +15,7 @@ ANALYSIS = Analysis(
     needs=lambda plan, threads: rig_needs(plan, threads, "blades"),
     check_solution=results.check_solution,
     arrays=output.arrays,
-    sizes=output.sizes,
+    sizes=lambda solution: {"n_pairs": solution.interface.n},
     write_files=output.write_files,
     charts=charts.charts,
     headline=partial(first_numbers, names=results.HEADLINE),

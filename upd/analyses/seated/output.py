@@ -31,11 +31,6 @@ SEATING = (RAISED, LOWERED, AGAIN)
 _STATES = "open stick slip"
 
 
-def sizes(solution: SeatedSolution) -> dict[str, int]:
-    """Nodes of both faces in the model."""
-    return {"n_pairs": solution.interface.n}
-
-
 def arrays(solution: SeatedSolution) -> dict[str, Group]:
     """Arrays for result.nc.
 
@@ -87,7 +82,7 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
     for j in of.kept:
         kind, unit = ("u", "mm") if j < 3 else ("r", "rad")
         out[f"damper_{kind}{'xyz'[j % 3]}"] = variable(step, motion[:, j], unit)
-    loss = of.copies * np.cumsum(phase.friction_loss)
+    loss = of.copies * np.cumsum(found.friction_loss(phase.before))
     out["friction_loss"] = variable(step, loss, "N mm", "since the first step")
     return out
 

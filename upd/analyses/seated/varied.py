@@ -51,10 +51,6 @@ def _steps(scene: SeatedScene, factor: float) -> Overrides:
     )
 
 
-def _finer(plan: SeatedPlan, source: str, factor: float) -> Overrides:
-    return refined(plan.scene, factor) if source == MESH else _steps(plan.scene, factor)
-
-
 def corrected(solution: SeatedSolution, numbers: Sequence[Result], found: Estimates) -> Estimates:
     """The parts by variations, of shares not below a spacing of nodes; none of what is rounding.
 
@@ -127,7 +123,16 @@ def _edge(inside: NDArray[np.bool_], quads: IntArray, area: NDArray[np.float64])
     return float(area[at_edge & inside].sum() / area[inside].sum())
 
 
-PROBLEM = Problem(make_plan, solve, make_results, levels=levels, finer=_finer, corrected=corrected)
+PROBLEM = Problem(
+    make_plan,
+    solve,
+    make_results,
+    levels=levels,
+    finer=lambda plan, source, factor: (
+        refined(plan.scene, factor) if source == MESH else _steps(plan.scene, factor)
+    ),
+    corrected=corrected,
+)
 
 
 # -- convergence studies --------------------------------------------------------------------------
