@@ -140,8 +140,9 @@ class DampingFit(Shown):
         Of a real or imaginary part, or of a magnitude.
     correlation : float
         Of residuals of neighbouring points, 0 for independent errors.
-    points : int
-        Of the curve.
+    correlation_limit : float
+        Three standard deviations of the correlation of so many independent errors: beyond it the
+        residuals are not independent.
     """
 
     frequency: FloatArray
@@ -153,14 +154,7 @@ class DampingFit(Shown):
     reference: float
     noise: NoiseLevel
     correlation: float
-    points: int
-
-    @property
-    def correlation_limit(self) -> float:
-        """Three standard deviations of the correlation of so many independent errors: beyond it the
-        residuals are not independent.
-        """
-        return float(3.0 / np.sqrt(self.points))
+    correlation_limit: float
 
     def response(self, frequency: ArrayLike) -> ComplexArray:
         """The fitted accelerance, (m/s2)/N.
@@ -379,8 +373,9 @@ def _reweighted(
             "several points within the width of its peaks"
         )
     near = float((r[:, 1:] * r[:, :-1]).sum() / max(float((r**2).sum()), np.finfo(float).tiny))
-    n = len(f)
-    fit = DampingFit(fr, df, zeta, dz, A, x[-_RESIDUAL:], reference, noise, near, n)
+    n, residual = len(f), x[-_RESIDUAL:]
+    limit = float(3.0 / np.sqrt(n))
+    fit = DampingFit(fr, df, zeta, dz, A, residual, reference, noise, near, limit)
     # r is weighted: sum ln v is of the weights
     least = max(float((r**2).mean()), float(np.finfo(float).tiny))
     return fit, float(n * np.log(least) + 2.0 * np.log(sigma).sum())
