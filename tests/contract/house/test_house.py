@@ -331,7 +331,7 @@ ROOM_LINES = {
     "vary": 1239,
     "reference": 901,
     "cli": 805,
-    "measured": 880,
+    "measured": 850,
     "reduction": 1099,
     "results": 664,
     "fem": 723,
