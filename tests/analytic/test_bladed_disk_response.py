@@ -96,4 +96,3 @@ def test_the_best_wedge_lies_between_free_and_stuck(sectors: dict[int, ReducedSe
     assert found.height[-1] == pytest.approx(stuck, rel=0.02)
     ratio, lowest = found.best
     assert ratio < 100.0 and lowest < 0.7 * stuck
-    assert WEDGE.centrifugal_force(100.0) == pytest.approx(143.0)

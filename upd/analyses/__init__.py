@@ -28,7 +28,7 @@ _NAMES = {
     "seated damper": "seated",
 }
 #: modules that are not the package of that name
-_MODULES = {"hertz": "contact.analysis", "flat": "contact.analysis", "seated": "seated.analysis"}
+_MODULES = {"hertz": "contact.analysis", "flat": "contact.analysis"}
 
 
 def analysis_of(scene: AnyScene) -> Analysis:

@@ -18,7 +18,6 @@ from upd.measured import (
     MeasuredCurve,
     MeasuredPeak,
     frac,
-    magnitude_correlation,
     noisy_peaks,
 )
 from upd.measured.compare import paired
@@ -138,7 +137,7 @@ def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]
         )
         return [what.withheld(case, reason)]
     try:
-        return [what.of((frac if curve.is_complex else magnitude_correlation)(mine, H), case)]
+        return [what.of(frac(mine, H if curve.is_complex else np.abs(H)), case)]
     except InputError as error:
         return [what.withheld(case, str(error))]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from upd.measured.compare import MeasuredPeak, frac, magnitude_correlation, noisy_peaks
+from upd.measured.compare import MeasuredPeak, frac, noisy_peaks
 from upd.measured.curve import MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.read import read_measured
@@ -13,7 +13,6 @@ __all__ = [
     "MeasuredPeak",
     "fit_damping",
     "frac",
-    "magnitude_correlation",
     "noisy_peaks",
     "read_measured",
 ]

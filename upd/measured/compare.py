@@ -53,7 +53,9 @@ def noisy_peaks(
 
     Beside the highest one they rise above their valleys by more than the extremes of n independent
     errors are apart, 2 sqrt(2 ln n) standard deviations. These are of the constant part of the
-    noise, from the median of the second differences d: median|d| / (0.6745 sqrt(6)).
+    noise, from the median of the second differences d: median|d| / (0.6745 sqrt(6)). A second
+    difference of independent errors has six times their variance; of a normal variable the median
+    of the modulus is 0.6745 standard deviations.
 
     Each is the top of a parabola of 1 / magnitude^2 over frequency^2, by least squares through the
     points above 0.9 of the highest one (three at least): of a damped mode's receptance exactly,
@@ -98,18 +100,10 @@ def noisy_peaks(
     top = top[a[top] >= above * a.max(initial=0.0)]
     if len(top) > 1:
         rise = peak_prominences(a, top)[0]
-        noise = 2.0 * np.sqrt(2.0 * np.log(len(a))) * _constant_noise(a)
+        deviation = np.median(np.abs(np.diff(a, 2))) / (_MEDIAN * np.sqrt(6.0))
+        noise = 2.0 * np.sqrt(2.0 * np.log(len(a))) * deviation
         top = top[(rise >= noise) | (a[top] == a[top].max())]
     return [_refined(f, a, int(i)) for i in top]
-
-
-def _constant_noise(a: FloatArray) -> float:
-    """Standard deviation of the errors of (n,) samples of a smooth curve.
-
-    The second difference of independent ones has six times their variance; of a normal variable the
-    median of the modulus is 0.6745 standard deviations.
-    """
-    return float(np.median(np.abs(np.diff(a, 2))) / (_MEDIAN * np.sqrt(6.0)))
 
 
 def _refined(f: FloatArray, a: FloatArray, i: int) -> MeasuredPeak:
@@ -163,6 +157,9 @@ def frac(measured: ArrayLike, computed: ArrayLike) -> float:
 
     1 where they differ by a factor only, which it does not see: compare heights beside it.
 
+    Of magnitudes alone, for curves without phase, it is no FRAC but the correlation of [3]_: phases
+    that differ do not lower it, so it is the larger of the two, and closer to 1 for unlike curves.
+
     Parameters
     ----------
     measured, computed : (n,) array_like of complex
@@ -184,6 +181,8 @@ def frac(measured: ArrayLike, computed: ArrayLike) -> float:
        functions, Proc. Int. Conf. Identification in Engineering Systems, Swansea (1996), 48-57.
     .. [2] W. Heylen, P. Avitabile, Correlation considerations - part 5 (degree of freedom
        correlation techniques), Proc. 16th Int. Modal Analysis Conf. (1998), 207-214.
+    .. [3] C. Zang, H. Grafe, M. Imregun, Frequency-domain criteria for correlating and updating
+       dynamic finite element models, Mech. Syst. Signal Process. 15 (2001), 139-155.
 
     Examples
     --------
@@ -202,35 +201,6 @@ def frac(measured: ArrayLike, computed: ArrayLike) -> float:
     if not power > 0.0:
         raise InputError("FRAC of a response that is zero throughout is not defined.")
     return float(abs(np.vdot(a, b)) ** 2 / power)
-
-
-def magnitude_correlation(measured: ArrayLike, computed: ArrayLike) -> float:
-    """The formula of `frac` on magnitudes alone, for curves without phase.
-
-    It is no FRAC: phases that differ do not lower it, so it is the larger of the two, and closer to
-    1 for unlike curves.
-
-    Parameters
-    ----------
-    measured, computed : (n,) array_like
-        Magnitudes or complex values.
-
-    Returns
-    -------
-    float
-        0 to 1.
-
-    Raises
-    ------
-    InputError
-        As `frac` does.
-
-    References
-    ----------
-    C. Zang, H. Grafe, M. Imregun, Frequency-domain criteria for correlating and updating dynamic
-    finite element models, Mech. Syst. Signal Process. 15 (2001), 139-155.
-    """
-    return frac(np.abs(np.asarray(measured)), np.abs(np.asarray(computed)))
 
 
 def paired(measured: Sequence[float], computed: Sequence[float]) -> dict[int, int]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ State = Literal["free", "stuck"]
 #: of `upd.units.UNITS` to (m/s2)/N
 TO_ACCELERANCE = {"accelerance": (0, 1.0), "mobility": (1, 1e-3), "receptance": (2, 1e-3)}
 QUANTITIES = tuple(TO_ACCELERANCE)
+RESPONSE_UNITS = tuple(unit for kind in QUANTITIES for unit in UNITS[kind])
 #: fewest points of a curve: a peak and both its sides
 LEAST_POINTS = 3
 
@@ -167,26 +168,24 @@ class Faults:
             raise InputError("\n".join(self.found))
 
 
-class ReadCurve(NamedTuple):
-    """Frequency (n,) in Hz, rising, and the response (n,), complex or magnitudes, in ``unit``;
-    ``label`` is what the file gives of it.
-    """
-
-    frequency: FloatArray
-    values: ComplexArray | FloatArray
-    unit: str
-    label: CurveLabel
-
-
 def checked_curve(
-    curve: ReadCurve, faults: Faults, place: Callable[[str, int], str], remedy: str
-) -> ReadCurve:
+    f: FloatArray,
+    values: ComplexArray | FloatArray,
+    unit: str,
+    label: CurveLabel,
+    faults: Faults,
+    place: Callable[[str, int], str],
+    remedy: str,
+) -> MeasuredCurve:
     """A curve with rising frequencies, as the file has it or turned round.
 
     Parameters
     ----------
-    curve
-        In the order of the file.
+    f, values, unit
+        Frequencies in Hz and the response, complex or magnitudes, in the order of the file; the
+        unit of the response.
+    label
+        What the file gives of it.
     faults
         Gets what is wrong.
     place
@@ -199,7 +198,6 @@ def checked_curve(
     InputError
         Where frequencies do not rise or fall all the way from above 0, or magnitudes are negative.
     """
-    f, values = curve.frequency, curve.values
     step = np.diff(f)
     rising = np.median(step) > 0.0 if len(step) else True
     doubled = np.append(False, step <= 0.0 if rising else step >= 0.0)
@@ -219,7 +217,9 @@ def checked_curve(
             faults.add(place("magnitude", k), words)
     faults.check()
     turned = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return curve._replace(frequency=f[turned], values=values[turned])
+    H, quantity = as_accelerance(f[turned], values[turned], unit)
+    blade = label.blade or "right"
+    return MeasuredCurve(f[turned], H, blade, label.state, label.force_ratio, quantity, unit)
 
 
 def the_one(names: list[str], wanted: str | None, word: str) -> str:
@@ -270,7 +270,7 @@ _WORDS = {"blade": get_args(Blade), "state": get_args(State)}
 
 @dataclass(frozen=True)
 class CurveLabel:
-    """What a curve is, each None where it is not given.
+    """What a curve of a file is, or which is asked for, each None where it is not given.
 
     Attributes
     ----------
@@ -278,11 +278,18 @@ class CurveLabel:
     state : {"free", "stuck"} or None
     force_ratio : float or None
         F_C/F_E.
+    column : str or None
+        Name of the response asked for, without its unit, where the file holds several; of a netCDF
+        file the variable, its groups in front of it with a slash.
+    unit : str or None
+        Of the response asked for, where the file names none.
     """
 
     blade: Blade | None = None
     state: State | None = None
     force_ratio: float | None = None
+    column: str | None = None
+    unit: str | None = None
 
     @property
     def words(self) -> str:
@@ -290,35 +297,16 @@ class CurveLabel:
         given = [(name, getattr(self, name)) for name in _SHOWN]
         return ", ".join(f"{_SHOWN[k]} {_shown(v)}" for k, v in given if v is not None)
 
-    @property
-    def condition(self) -> str | None:
-        """A linear limit or F_C/F_E: the one excludes the other."""
-        given = self.state if self.force_ratio is None else self.force_ratio
-        return None if given is None else _shown(given)
-
     def agrees(self, wanted: CurveLabel) -> bool:
-        """Whether nothing it gives is other than what is wanted."""
-        pairs = ((self.blade, wanted.blade), (self.condition, wanted.condition))
-        return all(None in pair or pair[0] == pair[1] for pair in pairs)
+        """Whether nothing it gives is other than what is wanted.
 
-
-class AskedCurve(NamedTuple):
-    """Which response of a file is asked for.
-
-    Attributes
-    ----------
-    column : str or None
-        Name of the response without its unit, where the file holds several; of a netCDF file the
-        variable, its groups in front of it with a slash.
-    unit : str or None
-        Of the response, where the file names none.
-    label : CurveLabel
-        Which curve, where the file gives it.
-    """
-
-    column: str | None = None
-    unit: str | None = None
-    label: CurveLabel = CurveLabel()
+        A linear limit and F_C/F_E exclude each other.
+        """
+        mine, other = (
+            (one.blade, one.state if one.force_ratio is None else _shown(one.force_ratio))
+            for one in (self, wanted)
+        )
+        return all(None in pair or pair[0] == pair[1] for pair in zip(mine, other, strict=True))
 
 
 #: nothing given, nothing wanted

@@ -140,8 +140,9 @@ class DampingFit(Shown):
         Of a real or imaginary part, or of a magnitude.
     correlation : float
         Of residuals of neighbouring points, 0 for independent errors.
-    points : int
-        Of the curve.
+    correlation_limit : float
+        Three standard deviations of the correlation of so many independent errors: beyond it the
+        residuals are not independent.
     """
 
     frequency: FloatArray
@@ -153,14 +154,7 @@ class DampingFit(Shown):
     reference: float
     noise: NoiseLevel
     correlation: float
-    points: int
-
-    @property
-    def correlation_limit(self) -> float:
-        """Three standard deviations of the correlation of so many independent errors: beyond it the
-        residuals are not independent.
-        """
-        return float(3.0 / np.sqrt(self.points))
+    correlation_limit: float
 
     def response(self, frequency: ArrayLike) -> ComplexArray:
         """The fitted accelerance, (m/s2)/N.
@@ -175,39 +169,21 @@ class DampingFit(Shown):
         (k,) ndarray of complex
         """
         x = np.concatenate([self.frequency, self.zeta, self.constant, self.residual])
-        return _Sum(np.asarray(frequency, float), len(self.zeta), self.reference)(x)[0]
+        return _sum(np.asarray(frequency, float), self.reference, x)[0]
 
 
-@dataclass(frozen=True)
-class _Sum:
-    """The sum of m modes and residual terms at frequencies f (n,), see the module."""
-
-    f: FloatArray
-    m: int
-    reference: float
-
-    @property
-    def powers(self) -> FloatArray:
-        """(n, 3) of the residual terms."""
-        return np.asarray((self.f[:, None] / self.reference) ** (2 * np.arange(_RESIDUAL)))
-
-    def shapes(self, fr: FloatArray, zeta: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """T and D, (n, m)."""
-        f = self.f[:, None]
-        D = fr**2 - f**2 + 2j * zeta * fr * f
-        T = np.asarray(-(f**2) / D, dtype=np.complex128)
-        return T, D
-
-    def __call__(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """H (n,) and its derivatives (n, 3 m + 3)."""
-        fr, zeta, A = np.split(x[: _OF_MODE * self.m], _OF_MODE)
-        f = self.f[:, None]
-        T, D = self.shapes(fr, zeta)
-        turned = -A * T / D
-        jacobian = np.hstack(
-            [turned * (2.0 * fr + 2j * zeta * f), turned * 2j * fr * f, T, self.powers]
-        )
-        return T @ A + self.powers @ x[_OF_MODE * self.m :], jacobian
+def _sum(f: FloatArray, reference: float, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """H (n,) of m modes and residual terms, and its derivatives (n, 3 m + 3), see the module: the
+    last m + 3 are what H is linear in.
+    """
+    fr, zeta, A = np.split(x[:-_RESIDUAL], _OF_MODE)
+    at = f[:, None]
+    D = fr**2 - at**2 + 2j * zeta * fr * at
+    T = np.asarray(-(at**2) / D, dtype=np.complex128)
+    powers = (at / reference) ** (2 * np.arange(_RESIDUAL))
+    turned = -A * T / D
+    jacobian = np.hstack([turned * (2.0 * fr + 2j * zeta * at), turned * 2j * fr * at, T, powers])
+    return T @ A + powers @ x[-_RESIDUAL:], jacobian
 
 
 def fit_damping(curve: MeasuredCurve, modes: ArrayLike | None = None) -> DampingFit:
@@ -264,9 +240,14 @@ def fit_damping(curve: MeasuredCurve, modes: ArrayLike | None = None) -> Damping
         raise InputError(
             f"{values} measured values for {unknowns} unknowns of {m} modes: measure more points"
         )
-    zeta = np.array([_start_zeta(f, size, one) for one in at])
-    sums = _Sum(f, m, float(np.sqrt(f[0] * f[-1])))
-    starts = _starts(sums, curve, at, zeta)
+    near = [p for p in found if np.isfinite(p.zeta) and p.zeta > 0.0]
+    # by half power of the peak next to it; a step of the curve where none has it
+    zeta = np.median(np.diff(f)) / at
+    if near:
+        nearest = np.abs([[p.frequency - one for p in near] for one in at]).argmin(axis=1)
+        zeta = np.array([p.zeta for p in near])[nearest]
+    reference = float(np.sqrt(f[0] * f[-1]))
+    starts = _starts(curve, reference, at, zeta)
     # without phase the valleys tell the signs, and a search that begins without regard to them may
     # end in another valley: it begins with and without their weight
     weights = [np.ones(len(f))]
@@ -274,32 +255,26 @@ def fit_damping(curve: MeasuredCurve, modes: ArrayLike | None = None) -> Damping
         weights.append(np.maximum(size / size.max(), np.finfo(float).eps))
     tried = []
     for sigma in weights:
-        near = [_weighted(sums, curve, x, sigma, _FEW) for x in starts]
-        begin = min(near, key=lambda one: one[1])[0]
-        tried.append(_reweighted(sums, curve, begin, sigma))
+        tries = [_weighted(curve, reference, x, sigma, _FEW) for x in starts]
+        begin = min(tries, key=lambda one: one[1])[0]
+        tried.append(_reweighted(curve, reference, begin, sigma))
     return min(tried, key=lambda one: one[1])[0]
 
 
-def _start_zeta(f: FloatArray, size: FloatArray, at: float) -> float:
-    """By half power of the peak next to a frequency; a step of the curve where it has none."""
-    near = [p for p in noisy_peaks(f, size) if np.isfinite(p.zeta) and p.zeta > 0.0]
-    if near:
-        return float(min(near, key=lambda p: abs(p.frequency - at)).zeta)
-    return float(np.median(np.diff(f)) / at)
-
-
-def _starts(sums: _Sum, curve: MeasuredCurve, at: FloatArray, zeta: FloatArray) -> list[FloatArray]:
+def _starts(
+    curve: MeasuredCurve, reference: float, at: FloatArray, zeta: FloatArray
+) -> list[FloatArray]:
     """Where the search begins: modal constants by linear least squares, of magnitudes with every
     choice of signs.
     """
-    T, _ = sums.shapes(at, zeta)
-    basis = np.hstack([T, sums.powers])
     if curve.is_complex:
+        x = np.concatenate([at, zeta, np.zeros(len(at) + _RESIDUAL)])
+        basis = _sum(curve.frequency, reference, x)[1][:, 2 * len(at) :]
         both = np.vstack([basis.real, basis.imag])
         H = np.concatenate([curve.accelerance.real, curve.accelerance.imag])
         linear = np.linalg.lstsq(both, H, rcond=None)[0]
         return [np.concatenate([at, zeta, linear])]
-    height = np.array([np.interp(one, sums.f, curve.magnitude) for one in at])
+    height = np.array([np.interp(one, curve.frequency, curve.magnitude) for one in at])
     others = list(itertools.product((1.0, -1.0), repeat=min(len(at), _MOST_SIGNS) - 1))
     out = []
     for signs in others:
@@ -314,9 +289,11 @@ def _starts(sums: _Sum, curve: MeasuredCurve, at: FloatArray, zeta: FloatArray) 
     return out
 
 
-def _residual(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _residual(
+    curve: MeasuredCurve, reference: float, x: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Differences (parts, n) from the measured values and their derivatives (parts, n, p)."""
-    H, J = sums(x)
+    H, J = _sum(curve.frequency, reference, x)
     if curve.is_complex:
         r = H - curve.accelerance
         return np.stack([r.real, r.imag]), np.stack([J.real, J.imag])
@@ -325,23 +302,27 @@ def _residual(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> tuple[FloatArr
 
 
 def _weighted(
-    sums: _Sum, curve: MeasuredCurve, start: FloatArray, sigma: FloatArray, most: int = _MOST
+    curve: MeasuredCurve,
+    reference: float,
+    start: FloatArray,
+    sigma: FloatArray,
+    most: int = _MOST,
 ) -> tuple[FloatArray, float, FloatArray, FloatArray]:
     """Unknowns, sum of squares, weighted residuals (parts, n) and derivatives (parts n, p)."""
-    m, p = sums.m, len(start)
-    fr, zeta, A = np.split(start[: _OF_MODE * m], _OF_MODE)
+    f, p = curve.frequency, len(start)
+    fr, zeta, A = np.split(start[:-_RESIDUAL], _OF_MODE)
     top = float(np.abs(curve.accelerance).max())
     size = np.where(A != 0.0, np.abs(A), np.abs(2.0 * zeta * top))
     scale = np.concatenate([zeta * fr, zeta, size, np.full(_RESIDUAL, size.max())])
     low, high = np.full(p, -np.inf), np.full(p, np.inf)
-    low[:m], high[:m] = sums.f[0], sums.f[-1]
-    low[m : 2 * m] = 0.0
+    low[: len(fr)], high[: len(fr)] = f[0], f[-1]
+    low[len(fr) : 2 * len(fr)] = 0.0
 
     def residual(x: FloatArray) -> FloatArray:
-        return np.asarray((_residual(sums, curve, x)[0] / sigma).ravel())
+        return np.asarray((_residual(curve, reference, x)[0] / sigma).ravel())
 
     def jacobian(x: FloatArray) -> FloatArray:
-        return np.asarray((_residual(sums, curve, x)[1] / sigma[:, None]).reshape(-1, p))
+        return np.asarray((_residual(curve, reference, x)[1] / sigma[:, None]).reshape(-1, p))
 
     eps = float(np.finfo(float).eps)
     found = least_squares(
@@ -355,35 +336,36 @@ def _weighted(
         gtol=4.0 * eps,
         max_nfev=most,
     )
-    r: FloatArray = found.fun.reshape(-1, len(sums.f))
+    r: FloatArray = found.fun.reshape(-1, len(f))
     return found.x, 2.0 * float(found.cost), r, np.asarray(found.jac)
 
 
 def _reweighted(
-    sums: _Sum, curve: MeasuredCurve, x: FloatArray, sigma: FloatArray
+    curve: MeasuredCurve, reference: float, x: FloatArray, sigma: FloatArray
 ) -> tuple[DampingFit, float]:
     """Fits with the weights of their own residuals until these repeat, and -2 / parts times the
     logarithm of the likelihood.
     """
-    mix = -1.0
+    f, mix = curve.frequency, -1.0
     for _ in range(_ROUNDS):
-        x, total, r, J = _weighted(sums, curve, x, sigma)
-        size = np.abs(sums(x)[0]) / np.abs(sums(x)[0]).max()
+        x, total, r, J = _weighted(curve, reference, x, sigma)
+        size = np.abs(_sum(f, reference, x)[0])
+        size /= size.max()
         last, mix = mix, noise_mix(r * sigma, size)
         sigma = np.sqrt((1.0 - mix) + mix * size**2)
         if abs(mix - last) <= _SETTLED:
             break
-    x, total, r, J = _weighted(sums, curve, x, sigma)
+    x, total, r, J = _weighted(curve, reference, x, sigma)
     _, p = J.shape
     variance = total / (r.size - p)
     # columns of one length: unknowns have many units
     length = np.linalg.norm(J, axis=0)
     inverse = np.linalg.pinv((J / length).T @ (J / length), hermitian=True)
     error = np.sqrt(variance * np.diag(inverse)) / length
-    order = np.argsort(x[: sums.m])
-    fr, zeta, A = (part[order] for part in np.split(x[: _OF_MODE * sums.m], _OF_MODE))
-    df, dz, _ = (part[order] for part in np.split(error[: _OF_MODE * sums.m], _OF_MODE))
-    top = float(np.abs(sums(x)[0]).max())
+    order = np.argsort(np.split(x[:-_RESIDUAL], _OF_MODE)[0])
+    fr, zeta, A = (part[order] for part in np.split(x[:-_RESIDUAL], _OF_MODE))
+    df, dz, _ = (part[order] for part in np.split(error[:-_RESIDUAL], _OF_MODE))
+    top = float(np.abs(_sum(f, reference, x)[0]).max())
     noise = NoiseLevel(float(np.sqrt(variance * mix)) / top, float(np.sqrt(variance * (1.0 - mix))))
     if not (np.isfinite(error).all() and (zeta > 0.0).all()):
         raise InputError(
@@ -391,8 +373,9 @@ def _reweighted(
             "several points within the width of its peaks"
         )
     near = float((r[:, 1:] * r[:, :-1]).sum() / max(float((r**2).sum()), np.finfo(float).tiny))
-    n = len(sums.f)
-    fit = DampingFit(fr, df, zeta, dz, A, x[_OF_MODE * sums.m :], sums.reference, noise, near, n)
+    n, residual = len(f), x[-_RESIDUAL:]
+    limit = float(3.0 / np.sqrt(n))
+    fit = DampingFit(fr, df, zeta, dz, A, residual, reference, noise, near, limit)
     # r is weighted: sum ln v is of the weights
     least = max(float((r**2).mean()), float(np.finfo(float).tiny))
     return fit, float(n * np.log(least) + 2.0 * np.log(sigma).sum())

@@ -9,6 +9,7 @@ result.nc of a run is such a file: its variables stand in groups,
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
@@ -18,15 +19,12 @@ import numpy as np
 from upd.errors import InputError, one_line
 from upd.measured.curve import (
     LEAST_POINTS,
-    QUANTITIES,
-    AskedCurve,
+    RESPONSE_UNITS,
     Blade,
     CurveLabel,
     Faults,
     MeasuredCurve,
-    ReadCurve,
     State,
-    as_accelerance,
     checked_curve,
     label_of,
     response_unit,
@@ -35,18 +33,20 @@ from upd.measured.curve import (
 )
 from upd.measured.text import read_text
 from upd.results.netcdf import open_netcdf
-from upd.units import UNITS, unit_factor
+from upd.units import unit_factor
 
 _AXIS = "frequency"
-_RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
+_NETCDF = (".nc", ".nc4", ".cdf", ".h5")
+#: faults of one file that are reported
+MOST_TOLD = 20
 
 
-def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
-    """A response of a netCDF file.
+def read_variables(file: Any, asked: CurveLabel, faults: Faults) -> MeasuredCurve:
+    """A response of an open netCDF file.
 
     Parameters
     ----------
-    path
+    file
         The file.
     asked
         Which response.
@@ -58,23 +58,12 @@ def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
     InputError
         Where something is wrong.
     """
-    try:
-        with open_netcdf(path) as file:
-            return _read(file, asked, faults)
-    except OSError as error:
-        reason = one_line(error)
-        raise InputError(
-            f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"
-        ) from None
-
-
-def _read(file: Any, asked: AskedCurve, faults: Faults) -> ReadCurve:
     found = dict(_responses(file, "", asked.unit))
     labels = {name: label_of(_said(*one)) for name, one in found.items()}
-    fitting = [name for name, label in labels.items() if label.agrees(asked.label)]
+    fitting = [name for name, label in labels.items() if label.agrees(asked)]
     names = fitting if asked.column is None and fitting else list(found)
     name = the_one(names, asked.column, "variables")
-    label = the_curve([labels[name]], asked.label)
+    label = the_curve([labels[name]], asked)
     group, variable = found[name]
     axis, scale, unit = group.variables[_AXIS], 1.0, ""
     with faults.at(f"variable {_AXIS}, attribute units"):
@@ -91,7 +80,10 @@ def _read(file: Any, asked: AskedCurve, faults: Faults) -> ReadCurve:
     faults.check()
     values = data[:, 0] + 1j * data[:, 1] if data.ndim == 2 else data
     return checked_curve(
-        ReadCurve(f, values, unit, label),
+        f,
+        values,
+        unit,
+        label,
         faults,
         lambda what, k: f"variable {_AXIS if what == 'frequency' else name}, place [{k}]",
         "magnitudes, or a last dimension of real and imaginary part",
@@ -119,16 +111,11 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
         for name, variable in group.variables.items():
             dims, shape = variable.dimensions, variable.shape
             over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
-            known = unit is not None or _units(variable) in _RESPONSE_UNITS
+            known = unit is not None or _units(variable) in RESPONSE_UNITS
             if name != _AXIS and over and known:
                 yield f"{path}{name}", (group, variable)
     for name, inner in group.groups.items():
         yield from _responses(inner, f"{path}{name}/", unit)
-
-
-_NETCDF = (".nc", ".nc4", ".cdf", ".h5")
-#: faults of one file that are reported
-MOST_TOLD = 20
 
 
 def read_measured(
@@ -183,7 +170,7 @@ def read_measured(
     ('mobility', [10.68, 15.0, 8.6])
     """
     place = Path(path)
-    asked = AskedCurve(column, unit, CurveLabel(blade, state, force_ratio))
+    asked = CurveLabel(blade, state, force_ratio, column, unit)
     found, faults = found_in(place, asked)
     if found is None:
         more = len(faults) - MOST_TOLD
@@ -192,21 +179,10 @@ def read_measured(
             f"{place}: {len(faults)} problem{'s' * (len(faults) != 1)}\n"
             + "\n".join(f"  {one}" for one in shown)
         )
-    H, quantity = as_accelerance(found.frequency, found.values, found.unit)
-    label = found.label
-    return MeasuredCurve(
-        found.frequency,
-        H,
-        blade or label.blade or "right",
-        state or label.state,
-        label.force_ratio if force_ratio is None else force_ratio,
-        quantity,
-        found.unit,
-        place,
-    )
+    return found
 
 
-def found_in(path: Path, asked: AskedCurve) -> tuple[ReadCurve | None, list[str]]:
+def found_in(path: Path, asked: CurveLabel) -> tuple[MeasuredCurve | None, list[str]]:
     """What a file holds, or its faults; files that did not change are read once.
 
     Parameters
@@ -220,17 +196,24 @@ def found_in(path: Path, asked: AskedCurve) -> tuple[ReadCurve | None, list[str]
         file = path.stat()
         return _found(path, file.st_mtime_ns, file.st_size, asked)
     except OSError as error:
-        return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
+        reason = error.strerror or one_line(error)
+        return None, [f"cannot be read ({reason}); give a measured curve as CSV or netCDF-4"]
 
 
 @lru_cache(maxsize=64)
 def _found(
-    path: Path, changed: int, size: int, asked: AskedCurve
-) -> tuple[ReadCurve | None, list[str]]:
+    path: Path, changed: int, size: int, asked: CurveLabel
+) -> tuple[MeasuredCurve | None, list[str]]:
     del changed, size
-    read = read_variables if path.suffix.lower() in _NETCDF else read_text
     faults = Faults()
     try:
-        return read(path, asked, faults), []
+        if path.suffix.lower() in _NETCDF:
+            with open_netcdf(path) as file:
+                curve = read_variables(file, asked, faults)
+        else:
+            curve = read_text(path, asked, faults)
     except InputError as error:
         return None, faults.found or [str(error)]
+    ratio = curve.force_ratio if asked.force_ratio is None else asked.force_ratio
+    blade, state = asked.blade or curve.blade, asked.state or curve.state
+    return replace(curve, blade=blade, state=state, force_ratio=ratio, source=path), []

@@ -29,11 +29,11 @@ from upd.measured.curve import (
     LABELS,
     LEAST_POINTS,
     QUANTITIES,
-    AskedCurve,
+    RESPONSE_UNITS,
     ComplexArray,
     CurveLabel,
     Faults,
-    ReadCurve,
+    MeasuredCurve,
     checked_curve,
     read_label,
     response_unit,
@@ -84,7 +84,7 @@ def _cell(line: int, place: int, name: str) -> str:
     return f"line {line}, column {place + 1} ({name})"
 
 
-def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
+def read_text(path: Path, asked: CurveLabel, faults: Faults) -> MeasuredCurve:
     """A response of a text file.
 
     Parameters
@@ -102,11 +102,13 @@ def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
         Where something is wrong.
     """
     lines = _lines(path)
-    separator = _separator(lines)
+    # what parts the cells of most lines
+    most = (m for m in _SEPARATORS if 2 * sum(m in line for _, line in lines) > len(lines))
+    separator = next(most, ",")
     split = [(n, [cell.strip().strip('"') for cell in text.split(separator)]) for n, text in lines]
     columns, body, head = _columns(split, separator)
     parts, scale, unit = _chosen(columns, asked, head, faults)
-    label, body = _labelled(columns, body, asked.label, separator, head, faults)
+    label, body = _labelled(columns, body, asked, separator, head, faults)
     rows = _numbers(body, parts, separator, faults, max(c.place for c in columns) + 1)
     faults.check()
     at = [n for n, _ in body]
@@ -116,13 +118,13 @@ def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
             f"line {last}: ends with {len(at)} points; a curve has {LEAST_POINTS} or more"
         )
 
-    def place(what: str, k: int) -> str:
-        return _cell(at[k], parts[what].place, parts[what].name or what)
-
     return checked_curve(
-        ReadCurve(scale * rows["frequency"], _response(rows, parts), unit, label),
+        scale * rows["frequency"],
+        _response(rows, parts),
+        unit,
+        label,
         faults,
-        place,
+        lambda what, k: _cell(at[k], parts[what].place, parts[what].name or what),
         "linear magnitudes, or name the columns real and imaginary",
     )
 
@@ -141,12 +143,6 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     if not lines:
         raise InputError("line 1: no values; give lines of frequency and response")
     return lines
-
-
-def _separator(lines: Sequence[tuple[int, str]]) -> str:
-    """What parts the cells of most lines."""
-    most = (m for m in _SEPARATORS if 2 * sum(m in line for _, line in lines) > len(lines))
-    return next(most, ",")
 
 
 def _number(cell: str, separator: str) -> float | None:
@@ -197,7 +193,7 @@ def _column(place: int, head: str) -> FileColumn:
 
 
 def _chosen(
-    columns: Sequence[FileColumn], asked: AskedCurve, line: int, faults: Faults
+    columns: Sequence[FileColumn], asked: CurveLabel, line: int, faults: Faults
 ) -> tuple[dict[str, FileColumn], float, str]:
     """The columns of frequency and of the response by their parts, factor to Hz, unit."""
     axis, unit = [c for c in columns if c.part == "frequency"], asked.unit
@@ -207,7 +203,11 @@ def _chosen(
     scale = 1.0
     with faults.at(_cell(line, axis[0].place, "frequency")):
         scale = _factor(axis[0].unit, ["frequency"])
-    names = list(dict.fromkeys(c.name for c in columns if c.name and _is_response(c, unit)))
+    # a response by its unit, or by one given beside the file
+    known = [
+        c for c in columns if unit is not None or c.part == "phase" or c.unit in RESPONSE_UNITS
+    ]
+    names = list(dict.fromkeys(c.name for c in known if c.name))
     if not names and asked.column is None:
         # its unit is what is wrong: reported below
         names = list(dict.fromkeys(c.name for c in columns if c.name))[:1]
@@ -249,17 +249,6 @@ def _factor(unit: str, kinds: Sequence[str]) -> float:
             raise
         known = str(error).partition("; ")[2]
         raise InputError(f"no unit; write it in brackets behind the name ({known})") from None
-
-
-def _is_response(c: FileColumn, unit: str | None) -> bool:
-    """Whether a column's unit is that of a response, or is given beside the file."""
-    if unit is not None or c.part == "phase":
-        return True
-    try:
-        unit_factor(c.unit, QUANTITIES)
-    except InputError:
-        return False
-    return True
 
 
 def _parts(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,18 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.measured.curve import QUANTITIES, AskedCurve, CurveLabel, MeasuredCurve, label_of
+from upd.measured.curve import RESPONSE_UNITS, CurveLabel, MeasuredCurve, label_of
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
 from upd.scene.base import Table
-from upd.units import UNITS
 
 Array = NDArray[np.float64]
 #: excitation.damping where the measured free curves give it, and its value until they are read
 FROM_MEASURED, UNTIL_READ = "measured", "0.5 %"
-_UNITS = tuple(unit for kind in QUANTITIES for unit in UNITS[kind])
-ResponseUnit = Annotated[str, q.one_of(_UNITS), q.Example('"(m/s2)/N"')]
+ResponseUnit = Annotated[str, q.one_of(RESPONSE_UNITS), q.Example('"(m/s2)/N"')]
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class MeasuredChoice(Table):
     @property
     def label(self) -> CurveLabel:
         """Which curve of the file."""
-        return CurveLabel(self.blade, self.state, self.centrifugal_to_force)
+        return CurveLabel(self.blade, self.state, self.centrifugal_to_force, self.column, self.unit)
 
     def read(self) -> MeasuredCurve:
         """The curve.
@@ -129,11 +127,11 @@ def note_files(data: Mapping[str, Any]) -> None:
         )
         try:
             wanted = label_of({key: table[key] for key in keys.values() if key in table})
-            found, _ = found_in(path, AskedCurve(column, unit, wanted))
+            found, _ = found_in(path, replace(wanted, column=column, unit=unit))
         except InputError:
             continue
         for name, key in keys.items():
-            if found is not None and (given := getattr(found.label, name)) is not None:
+            if found is not None and (given := getattr(found, name)) is not None:
                 table.setdefault(key, given)
 
 
@@ -162,7 +160,7 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
                 "give that file, or remove digest to take this one"
             )
             continue
-        _, faults = found_in(path, AskedCurve(one.column, one.unit, one.label))
+        _, faults = found_in(path, one.label)
         yield from [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
         if len(faults) > MOST_TOLD:
             yield f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more"

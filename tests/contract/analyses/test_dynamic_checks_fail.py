@@ -201,23 +201,26 @@ def test_a_motion_off_by_a_little_is_off_balance(response: ForcedSolution) -> No
     assert 1e-6 < off < 1e-4
 
 
-def _mode(s: ModalSolution, **values: Any) -> ModalSolution:
-    found = s.sets[0]
-    return replace(
-        s, sets=[replace(found, modes=[replace(found.modes[0], **values), *found.modes[1:]])]
-    )
+def _spoiled(s: ModalSolution, **values: Any) -> ModalSolution:
+    """Something of its first modes."""
+    (key, found), *others = s.sets.items()
+    return replace(s, sets=dict([(key, replace(found, **values)), *others]))
+
+
+def _mode(s: ModalSolution, name: str) -> ModalSolution:
+    first, *others = next(iter(s.sets.values())).modes
+    return _spoiled(s, modes=[replace(first, **{name: 1.001 * getattr(first, name)}), *others])
 
 
 def _missed(s: ModalSolution) -> ModalSolution:
-    found = s.sets[0]
-    body, m = found.found[0]
+    (body, m), *others = next(iter(s.sets.values())).found
     bad = replace(m, missed=1, message="one of two was found")
-    return replace(s, sets=[replace(found, found=[(body, bad), *found.found[1:]])])
+    return _spoiled(s, found=[(body, bad), *others])
 
 
 SPOIL_MODAL: dict[str, Callable[[ModalSolution], ModalSolution]] = {
-    "mode residual": lambda s: _mode(s, frequency=1.001 * s.sets[0].modes[0].frequency),
-    "orthogonality": lambda s: _mode(s, shape=1.001 * s.sets[0].modes[0].shape),
+    "mode residual": lambda s: _mode(s, "frequency"),
+    "orthogonality": lambda s: _mode(s, "shape"),
     "no mode missed": _missed,
     "reduced frequencies": lambda s: replace(
         s, reductions=[replace(r, frequency=1.03 * r.frequency) for r in s.reductions]

@@ -13,7 +13,7 @@ from rigs import undeclared
 
 import upd
 from upd.analyses import make_plan
-from upd.analyses.seated.analysis import ANALYSIS
+from upd.analyses.seated import ANALYSIS
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
 from upd.analyses.seated.solve import SeatedSolution

@@ -331,7 +331,7 @@ ROOM_LINES = {
     "vary": 1233,
     "reference": 860,
     "cli": 805,
-    "measured": 880,
+    "measured": 850,
     "reduction": 1049,
     "results": 664,
     "fem": 689,

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from upd.analyses.base import Resolved, conditions
-from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
-from upd.analyses.bladed_disk.solve import BladedDiskSolution, Crossing, DampedWave, Proof
+from upd.analyses.base import conditions
+from upd.analyses.bladed_disk.solve import BladedDiskSolution, Crossing, DampedWave
 from upd.hbm.springs.checks import creep
 from upd.results import NO_CASE, Case, Check, ErrorPart, Estimates, Group, Result, variable
 from upd.results import quantities as q
@@ -119,7 +117,7 @@ def _at(c: Crossing) -> Case:
 
 def check_solution(solution: BladedDiskSolution) -> list[Check]:
     """Frequencies solved by themselves, and with what the model leaves out."""
-    scene, proof, wave = solution.plan.scene, solution.proof, solution.wave
+    scene, wave = solution.plan.scene, solution.wave
     reduced: list[Check] = []
     if wave is not None:
         errors = [one.frequency_error for one in wave.sectors.values()]
@@ -135,30 +133,15 @@ def check_solution(solution: BladedDiskSolution) -> list[Check]:
         lacking = max(0.0, 3.0 - scene.response.harmonics)
         few = "omitted harmonics", lacking, 0, "harmonics lacking to know their effect on the peak"
         reduced += conditions(NO_CASE, "take response.harmonics = 3 or more", few, fatal=False)
-    if proof is None:
-        return reduced
-    case = Case(nodal_diameter=proof.nodal_diameter)
-    error = float(np.abs(proof.projected / proof.direct - 1.0).max())
-    changed = {
-        DISPLACED: (proof.displaced, "use another program for the last digits"),
-        CORIOLIS: (_farther(proof), "both travelling waves differ: see each in the check"),
-    }
-    compared = f"|in the span of others / by itself - 1| at {proof.speed * _RPM:.5g} rpm"
+    checks = [one.check(scene.left_out) for one in solution.left_out] + reduced
+    if solution.proof is None:
+        return checks
+    n, speed, projected, direct = solution.proof
+    error = float(np.abs(projected / direct - 1.0).max())
+    compared = f"|in the span of others / by itself - 1| at {speed * _RPM:.5g} rpm"
     between = "nodal diameters in between", error, PROJECTION_LIMIT, compared
-    checks = conditions(case, "compute more nodal diameters: raise modes.computed", between)
-    for name, (other, remedy) in changed.items():
-        k = int(np.abs(other / proof.direct - 1.0).argmax())
-        numbers = float(proof.direct[k]), float(other[k])
-        resolved = Resolved(name, q.F_SPINNING.named(k + 1), case, *numbers, "Hz", remedy)
-        checks.append(resolved.check(scene.left_out))
-    return checks + reduced
-
-
-def _farther(proof: Proof) -> np.ndarray:
-    """(m,) of both waves, the frequency farther from that without the Coriolis force."""
-    one, other = proof.coriolis
-    farther = np.abs(one - proof.direct) > np.abs(other - proof.direct)
-    return np.asarray(np.where(farther, one, other))
+    remedy = "compute more nodal diameters: raise modes.computed"
+    return conditions(Case(nodal_diameter=n), remedy, between) + checks
 
 
 def arrays(solution: BladedDiskSolution) -> dict[str, Group]:
@@ -167,20 +150,21 @@ def arrays(solution: BladedDiskSolution) -> dict[str, Group]:
     speed = variable("", scene.rotation.speed * _RPM, "rpm")
     numbers = variable("nodal_diameter", np.arange(len(solution.at_rest)))
     sectors = variable("", scene.n_sectors)
+    orders = variable("engine_order", np.array(scene.rotation.engine_orders))
     dims = "nodal_diameter mode"
     if scene.wants("modes"):
         rest = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_rest, "Hz")}
         out["at rest"] = Group(rest, content=BY_DIAMETER, case=Case(name="at rest"))
     if scene.wants("interference"):
         at = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_speed, "Hz")}
-        at |= {"speed": speed, "engine_order": _orders(solution), "sectors": sectors}
+        at |= {"speed": speed, "engine_order": orders, "sectors": sectors}
         out["at speed"] = Group(at, content=BY_DIAMETER, case=Case(name="at speed"))
     if scene.wants("campbell"):
         over = {
             "speed": variable("speed", solution.speeds * _RPM, "rpm"),
             "frequency": variable("nodal_diameter speed mode", solution.campbell, "Hz"),
             "operating_speed": speed,
-            "engine_order": _orders(solution),
+            "engine_order": orders,
             "sectors": sectors,
         }
         out["campbell"] = Group(over, content=CAMPBELL)
@@ -213,10 +197,6 @@ def _wave_arrays(wave: DampedWave) -> dict[str, Group]:
         }
         out["wave performance"] = Group(over, content=PERFORMANCE, case=case)
     return out
-
-
-def _orders(solution: BladedDiskSolution) -> Any:
-    return variable("engine_order", np.array(solution.plan.scene.rotation.engine_orders))
 
 
 def write_files(solution: BladedDiskSolution, folder: Path) -> None:

@@ -58,23 +58,18 @@ def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
     """Derive the plan of ``scene``."""
     chosen = parameters(scene)
     cost = CostModel(scene, recipes.count(scene.recipe, chosen))
+    curves = 1.5 * damped(scene) + len(scene.response.ratios) * scene.wants("performance")
     for body, count in cost.size.items():
         cost.dynamic_body(count, 2.0)
         # the check solves one more; of the harmonics, some share a nodal diameter
         most = min(scene.response.harmonics + 1, scene.n_sectors // 2 + 1)
         times = len(computed(scene)) + 1 + most * damped(scene)
         cost.modes(f"{body}, modes", count, times)
-        cost.shared += _curves_s(scene, count["contact"])
+        unknowns = 6 * count["contact"] * (2 * scene.response.harmonics + 1)
+        cost.shared += float(curves * _CURVE_S * (unknowns / _UNKNOWNS) ** 1.5)
     cost.jobs = [(_REDUCED if damped(scene) else _COMPLEX) * one for one in cost.jobs]
     needs = cost.side_by_side(cost.threads, len(computed(scene)))
     return BladedDiskPlan.of(cost, "full", chosen, _effects(scene), needs, _FILES_S)
-
-
-def _curves_s(scene: BladedDiskScene, contact: int) -> float:
-    """Seconds of the damped curves, of one thread."""
-    curves = 1.5 * damped(scene) + len(scene.response.ratios) * scene.wants("performance")
-    unknowns = 6 * contact * (2 * scene.response.harmonics + 1)
-    return float(curves * _CURVE_S * (unknowns / _UNKNOWNS) ** 1.5)
 
 
 def _effects(scene: BladedDiskScene) -> list[Effect]:

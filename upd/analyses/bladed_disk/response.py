@@ -66,10 +66,6 @@ class Wedge(NamedTuple):
     mu: float
     guide: float = 0.0
 
-    def centrifugal_force(self, speed: float) -> float:
-        """F_C = m r Omega^2 [N] at a speed in rad/s."""
-        return self.mass * self.radius * speed**2
-
 
 def gap_of(
     sector: ReducedSector, wedge: Wedge, f_c: float

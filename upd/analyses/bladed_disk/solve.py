@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
-from upd.analyses.base import keeping
-from upd.analyses.bladed_disk.plan import BladedDiskPlan, computed, damped, rotates
+from upd.analyses.base import Resolved, keeping
+from upd.analyses.bladed_disk.plan import (
+    CORIOLIS,
+    DISPLACED,
+    BladedDiskPlan,
+    computed,
+    damped,
+    rotates,
+)
 from upd.analyses.bladed_disk.response import (
     WavePerformance,
     Wedge,
@@ -33,7 +40,7 @@ from upd.fem.inertia import (
 from upd.hbm import FrequencyResponse, nodal_diameters
 from upd.linalg.parallel import in_parallel
 from upd.linalg.select import threads
-from upd.mesh import Mesh, recipes
+from upd.mesh import recipes
 from upd.progress import Stages
 from upd.reduction.cyclic import (
     CyclicModel,
@@ -43,6 +50,8 @@ from upd.reduction.cyclic import (
     reduce_sector,
     with_coriolis,
 )
+from upd.results import Case
+from upd.results import quantities as q
 from upd.scene import BladedDiskScene
 
 Array = NDArray[np.float64]
@@ -65,28 +74,6 @@ class Crossing(NamedTuple):
     mode: int
     speed: float
     frequency: float
-
-
-class Proof(NamedTuple):
-    """A nodal diameter between the computed ones at the largest speed, solved by itself.
-
-    Attributes
-    ----------
-    nodal_diameter : int
-    speed : float
-        rad/s.
-    projected, direct, displaced : (m,) ndarray
-        In the span of the computed ones; by itself; with the stiffness of the displaced state. Hz.
-    coriolis : (2, m) ndarray
-        Both waves with the Coriolis force, Hz.
-    """
-
-    nodal_diameter: int
-    speed: float
-    projected: Array
-    direct: Array
-    displaced: Array
-    coriolis: Array
 
 
 class DampedWave(NamedTuple):
@@ -143,7 +130,11 @@ class BladedDiskSolution:
         Hz.
     crossings : list
         The nearest to the operating speed first.
-    proof : Proof or None
+    proof : tuple or None
+        A nodal diameter between the computed ones, the largest speed in rad/s, and (m,) frequencies
+        there in Hz: in the span of the computed ones, and solved by itself.
+    left_out : list
+        Its numbers solved again with effects left out.
     wave : DampedWave or None
     """
 
@@ -154,14 +145,9 @@ class BladedDiskSolution:
     speeds: Array = field(default_factory=lambda: np.empty(0))
     campbell: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
     crossings: list[Crossing] = field(default_factory=list)
-    proof: Proof | None = None
+    proof: tuple[int, float, Array, Array] | None = None
+    left_out: list[Resolved] = field(default_factory=list)
     wave: DampedWave | None = None
-
-
-def folded(engine_order: int, n_sectors: int) -> int:
-    """Nodal diameter that an engine order excites, 0 to N/2."""
-    n = engine_order % n_sectors
-    return min(n, n_sectors - n)
 
 
 def solve(plan: BladedDiskPlan, stages: Stages) -> BladedDiskSolution:
@@ -181,14 +167,14 @@ def _solve(solution: BladedDiskSolution, stages: Stages) -> None:
     with stages("mesh", f"{scene.recipe}, 1 of {scene.n_sectors} sectors"):
         sector = solution.sector = _sector(plan)
     with stages("matrices", f"{3 * sector.mesh.n_node} dofs"):
-        K, M = _matrices(solution, sector.mesh)
+        mesh, material, element = sector.mesh, _material(plan), scene.mesh.element
+        K, M = stiffness(mesh, material, element), mass(mesh, material, element)
         model = CyclicModel.of(sector, K, M)
-    u = np.zeros(3 * sector.mesh.n_node)
+    u = np.zeros(3 * mesh.n_node)
     if rotates(scene):
         with stages("prestress", "static state at nodal diameter 0"):
-            mesh, material = sector.mesh, _material(plan)
             u = model.static(centrifugal_load(mesh, M))
-            stress = stress_stiffness(mesh, material, u, scene.mesh.element)
+            stress = stress_stiffness(mesh, material, u, element)
             model = CyclicModel.of(sector, K, M, csr_array(stress - plane_mass(M)))
     known = computed(scene)
     with stages("modes", f"nodal diameters {', '.join(map(str, known))}"):
@@ -206,7 +192,7 @@ def _solve(solution: BladedDiskSolution, stages: Stages) -> None:
         solution.wave = _damped_wave(solution, model, family, stages)
     if scene.left_out.solves:
         with stages("effects left out", "one nodal diameter solved by itself"):
-            solution.proof = _proof(solution, model, family, u)
+            _prove(solution, model, family, (K, M), u)
 
 
 def _sector(plan: BladedDiskPlan) -> Sector:
@@ -223,12 +209,6 @@ def _material(plan: BladedDiskPlan) -> Material:
     return Material(given.E, given.nu, given.density)
 
 
-def _matrices(solution: BladedDiskSolution, mesh: Mesh) -> tuple[csr_array, csr_array]:
-    material = _material(solution.plan)
-    element = solution.plan.scene.mesh.element
-    return stiffness(mesh, material, element), mass(mesh, material, element)
-
-
 def _by_diameter(family: ModeFamily, model: CyclicModel, count: int, speed: float) -> Array:
     """(N/2 + 1, m) frequencies, Hz."""
     return np.array([family.frequencies(n, count, speed) for n in model.nodal_diameters])
@@ -238,44 +218,58 @@ def _crossings(solution: BladedDiskSolution, family: ModeFamily) -> list[Crossin
     """All up to the largest speed, the nearest to the operating speed first."""
     scene, speeds = solution.plan.scene, solution.speeds
     count, found = scene.modes.count, []
+
+    def above(w: float, n: int, mode: int, order: int) -> float:
+        return float(family.frequencies(n, count, w)[mode] - order * w / (2.0 * np.pi))
+
     for order in scene.rotation.engine_orders:
-        n = folded(order, scene.n_sectors)
+        n = min(order % scene.n_sectors, -order % scene.n_sectors)
         for mode in range(count):
-
-            def above(w: float, n: int = n, mode: int = mode, order: int = order) -> float:
-                return float(family.frequencies(n, count, w)[mode] - order * w / (2.0 * np.pi))
-
             over = solution.campbell[n, :, mode] - order * speeds / (2.0 * np.pi)
             for k in np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0)):
-                w = float(brentq(above, speeds[k], speeds[k + 1]))
+                w = float(brentq(above, speeds[k], speeds[k + 1], args=(n, mode, order)))
                 f = float(order * w / (2.0 * np.pi))
                 found.append(Crossing(order, n, mode + 1, w, f))
     return sorted(found, key=lambda c: abs(c.speed - scene.rotation.speed))
 
 
-def _proof(solution: BladedDiskSolution, model: CyclicModel, family: ModeFamily, u: Array) -> Proof:
-    """The nodal diameter farthest from the computed ones, at the largest speed."""
-    scene, sector = solution.plan.scene, model.sector
+def _prove(
+    solution: BladedDiskSolution,
+    model: CyclicModel,
+    family: ModeFamily,
+    matrices: tuple[csr_array, csr_array],
+    u: Array,
+) -> None:
+    """The nodal diameter farthest from the computed ones, at the largest speed: solved by itself,
+    with the stiffness of the displaced state, with the Coriolis force.
+    """
+    scene, sector, (K, M) = solution.plan.scene, model.sector, matrices
     known, count = np.array(computed(scene)), scene.modes.count
     n = max(model.nodal_diameters, key=lambda n: int(np.abs(known - n).min()))
     speed = float(solution.speeds[-1])
     found = model.modes(n, count, speed)
-    U = sector.field(found.shapes, n)
-    K, M = _matrices(solution, sector.mesh)
+    f, U = found.frequency, sector.field(found.shapes, n)
+    solution.proof = n, speed, family.frequencies(n, count, speed), f
     moved = displaced_stiffness(
         sector.mesh, _material(solution.plan), speed**2 * u, scene.mesh.element
     )
     # in the span of the modes
     more = U.conj().T @ ((moved - K) @ U)
-    value = np.linalg.eigvalsh(np.diag((2.0 * np.pi * found.frequency) ** 2) + more)
-    return Proof(
-        n,
-        speed,
-        family.frequencies(n, count, speed),
-        found.frequency,
-        np.sqrt(value) / (2.0 * np.pi),
-        with_coriolis(found.frequency, U, coriolis(M), speed),
-    )
+    value = np.linalg.eigvalsh(np.diag((2.0 * np.pi * f) ** 2) + more)
+    # of both waves the frequency farther from that without the force
+    one, other = with_coriolis(f, U, coriolis(M), speed)
+    changed = {
+        DISPLACED: (np.sqrt(value) / (2.0 * np.pi), "use another program for the last digits"),
+        CORIOLIS: (
+            np.where(np.abs(one - f) > np.abs(other - f), one, other),
+            "both travelling waves differ: see each in the check",
+        ),
+    }
+    for name, (included, remedy) in changed.items():
+        k = int(np.abs(included / f - 1.0).argmax())
+        of, case = q.F_SPINNING.named(k + 1), Case(nodal_diameter=n)
+        numbers = float(f[k]), float(included[k])
+        solution.left_out.append(Resolved(name, of, case, *numbers, "Hz", remedy))
 
 
 def _damped_wave(
@@ -315,7 +309,7 @@ def _damped_wave(
     x, y, _ = mesh.points[tip[0]]
     row = np.array([-y, x, 0.0]) / np.hypot(x, y) @ one.rows["tip"]
     wedge = _wedge(scene, one)
-    f_c = wedge.centrifugal_force(crossing.speed)
+    f_c = wedge.mass * wedge.radius * crossing.speed**2
     low = 0.97 * crossing.frequency
     solved = partial(wave_response, sectors, wedge, f_c, engine_order=crossing.engine_order)
     with stages("response", f"EO {crossing.engine_order}, {chosen.points} frequencies"):

@@ -49,7 +49,11 @@ def arrays(solution: ModalSolution) -> dict[str, Group]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response".
     """
-    out = {f"modes {found.kind} {found.arrangement}": _modes(found) for found in solution.sets}
+    out = {}
+    for (arrangement, kind), found in solution.sets.items():
+        frequencies = variable("mode", [m.frequency for m in found.modes], "Hz")
+        modes = Group({"frequency": frequencies}, content=MODES, case=found.case)
+        out[f"modes {kind} {arrangement}"] = modes
     if solution.response is not None:
         out |= {
             f"response {kind}": _response(solution.response, kind)
@@ -57,11 +61,6 @@ def arrays(solution: ModalSolution) -> dict[str, Group]:
         }
         out |= measured_arrays(solution.plan.scene.measured)
     return out
-
-
-def _modes(found: ModeSet) -> Group:
-    frequencies = variable("mode", [m.frequency for m in found.modes], "Hz")
-    return Group({"frequency": frequencies}, content=MODES, case=found.case)
 
 
 def _response(response: RigResponse, kind: str) -> Group:
@@ -104,6 +103,14 @@ def _blade_chart(arrays: Arrays, blade: str) -> Chart | None:
         Trace(g.attributes["kind"], frequency_of(g), np.where(H > 0.0, H, np.nan), colour=k)
         for k, g, H in curves
     )
+    marks = [
+        Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", k)
+        for k, g, _ in curves
+        if f"peak_frequency_{blade}" in g
+        for f, height in zip(
+            *(g[f"peak_{name}_{blade}"].data for name in ("frequency", "accelerance")), strict=True
+        )
+    ]
     first = curves[0][1]
     f, damping = frequency_of(first), scalar(first, "damping")
     return Chart(
@@ -113,19 +120,9 @@ def _blade_chart(arrays: Arrays, blade: str) -> Chart | None:
         traces,
         case=f"{blade} blade",
         figure="response",
-        marks=tuple(mark for k, g, _ in curves for mark in _peaks(g, blade, k)),
+        marks=tuple(marks),
         detail="" if damping is None else f"damping {100.0 * damping:.3g} %",
     )
-
-
-def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
-    names = (f"peak_frequency_{blade}", f"peak_accelerance_{blade}")
-    if not set(names) <= set(group):
-        return []
-    pairs = zip(*(group[name].data for name in names), strict=True)
-    return [
-        Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs
-    ]
 
 
 # -- files -----------------------------------------------------------------------------------------
@@ -159,7 +156,7 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
     from upd.mesh.export import write_fields
 
     drawings: dict[str, list[Drawing]] = {}
-    for found in solution.sets:
+    for (arrangement, kind), found in solution.sets.items():
         meshes, shapes = shapes_of(found)
         data: dict[str, dict[str, Array]] = {name: {} for name in meshes}
         for k, (mode, shape) in enumerate(shapes, 1):
@@ -167,10 +164,10 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
                 data[name][f"mode_{k:02d}_{mode.frequency:.1f}Hz"] = u
             if k <= _DRAWN:
                 who = "" if mode.body.name == "rig" else f", {mode.body.name} blade"
-                title = f"{found.arrangement}, {found.kind} {k}{who}\n{mode.frequency:.2f} Hz"
+                title = f"{arrangement}, {kind} {k}{who}\n{mode.frequency:.2f} Hz"
                 picture = partial(draw_mode, meshes, shape, title=title)
-                drawings.setdefault(found.kind, []).append(picture)
-        write_fields(folder / f"modes_{found.kind}_{found.arrangement}.vtu", meshes, data)
+                drawings.setdefault(kind, []).append(picture)
+        write_fields(folder / f"modes_{kind}_{arrangement}.vtu", meshes, data)
     for kind, mine in drawings.items():
         write_png(draw_sheet(mine, _DRAWN, _SIZE), folder / f"modes_{kind}.png")
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES, CostModel, Count
+from upd.analyses.cost import NODES, CostModel
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import RigScene
@@ -42,7 +42,14 @@ def make_plan(scene: RigScene) -> ModalPlan:
     found = configurations(scene)
     if not found:
         raise InputError('want: asks for no modes, reduction or response; add "free" or "glued"')
-    cost, families = CostModel(scene, _sizes(scene, found, symmetry)), 1 + (symmetry == "half")
+    size = {
+        f"{body}, {arrangement}": count
+        for arrangement, kind in found
+        for body, count in recipes.count(
+            scene.recipe, parameters(scene, arrangement, kind, symmetry)
+        ).items()
+    }
+    cost, families = CostModel(scene, size), 1 + (symmetry == "half")
     for body, count in cost.size.items():
         cost.dynamic_body(count)
         cost.modes(f"{body}, modes", count, families)
@@ -68,16 +75,6 @@ def _add_more(cost: CostModel, scene: RigScene, arrangement: str) -> None:
         cost.seconds += 0.3
         if scene.left_out.solves:
             cost.modes(f"right, {arrangement}, modes", right)
-
-
-def _sizes(scene: RigScene, found: list[tuple[str, str]], symmetry: str) -> dict[str, Count]:
-    return {
-        f"{body}, {arrangement}": count
-        for arrangement, kind in found
-        for body, count in recipes.count(
-            scene.recipe, parameters(scene, arrangement, kind, symmetry)
-        ).items()
-    }
 
 
 def _effects(scene: RigScene, symmetry: str) -> list[Effect]:

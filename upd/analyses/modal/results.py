@@ -42,7 +42,7 @@ _KEEP = "keep more fixed-interface modes: raise reduction.modes"
 
 def make_results(solution: ModalSolution) -> list[Result]:
     """All numbers of a run."""
-    results = [one for found in solution.sets for one in mode_results(solution, found)]
+    results = [one for found in solution.sets.values() for one in mode_results(solution, found)]
     if solution.reductions:
         results += _reduction_results(solution.reductions)
     if solution.response is not None:
@@ -56,9 +56,9 @@ def mode_results(solution: ModalSolution, found: ModeSet) -> list[Result]:
     if not found.modes:
         below = solution.plan.scene.modes.below
         reason = f"no mode lies below modes.below = {below:g} Hz; raise it"
-        return [q.NATURAL[found.kind].withheld(found.case, reason, n=1)]
+        return [q.NATURAL[found.case.kind].withheld(found.case, reason, n=1)]
     modes = [
-        q.NATURAL[found.kind].of(mode.frequency, found.case, n=k, exact=False)
+        q.NATURAL[found.case.kind].of(mode.frequency, found.case, n=k, exact=False)
         for k, mode in enumerate(found.modes, 1)
     ]
     return with_printed(modes, printed_of(solution.plan.scene))
@@ -127,7 +127,7 @@ def _beside_measured(solution: ModalSolution, response: RigResponse) -> list[Res
 
 def check_solution(solution: ModalSolution) -> list[Check]:
     """All self-checks."""
-    checks = [check for found in solution.sets for check in _modes_checks(found)]
+    checks = [check for found in solution.sets.values() for check in _modes_checks(found)]
     for r in solution.reductions:
         off = float(np.abs(r.frequency / r.full - 1.0).max())
         case, what = Case(body=r.body.name), "|f reduced / f full - 1|"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -13,6 +13,7 @@ from upd.analyses.base import Resolved, keeping
 from upd.analyses.modal.plan import MODES_ABOVE, MORE_MODES, ModalPlan, configurations, parameters
 from upd.analyses.seated.bodies import Blade, make_blade
 from upd.dynamics import (
+    ModalSystem,
     frequency_response,
     modal_system,
     peak_response,
@@ -43,19 +44,13 @@ class RigMode:
 
 @dataclass
 class ModeSet:
-    """Modes of one configuration, rising, and the answers of their solver by body and mirror
-    family.
+    """Modes of one configuration, its case, rising, and the answers of their solver by body and
+    mirror family.
     """
 
-    arrangement: str
-    kind: str
+    case: Case
     modes: list[RigMode]
     found: list[tuple[Blade, Modes]]
-
-    @property
-    def case(self) -> Case:
-        """The configuration."""
-        return Case(kind=self.kind, arrangement=self.arrangement)
 
 
 @dataclass(frozen=True)
@@ -102,6 +97,8 @@ class ModalSolution:
 
     Attributes
     ----------
+    sets
+        By arrangement and "free" or "glued".
     left_out
         Numbers solved again with effects left out.
     estimates
@@ -109,7 +106,7 @@ class ModalSolution:
     """
 
     plan: ModalPlan
-    sets: list[ModeSet] = field(default_factory=list)
+    sets: dict[tuple[str, str], ModeSet] = field(default_factory=dict)
     reductions: list[ReducedBlade] = field(default_factory=list)
     response: RigResponse | None = None
     left_out: list[Resolved] = field(default_factory=list)
@@ -124,9 +121,16 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
     solution = ModalSolution(plan)
     with keeping(solution):
         for arrangement, kind in configurations(plan.scene):
-            solution.sets.append(_mode_set(plan, arrangement, kind, stages))
+            solution.sets[arrangement, kind] = _mode_set(plan, arrangement, kind, stages)
         if plan.scene.wants("reduction"):
-            _reduce(solution, stages)
+            # on whole bodies, whatever the mirror plane saves elsewhere
+            first = plan.scene.modes.arrangements[0]
+            with stages("mesh and assembly", f"whole blades, {first}"):
+                bodies = _bodies(plan, first, "free", "full")
+            names, kept = ", ".join(b.name for b in bodies), plan.scene.reduction.words
+            with stages("reduction", f"{names}: {kept} each"):
+                jobs = [partial(_reduced, solution, body) for body in bodies]
+                solution.reductions = in_parallel(jobs, plan.workers)
         if plan.scene.wants("response"):
             with stages("response", f"{plan.scene.response.points} frequencies"):
                 solution.response = _response(solution)
@@ -163,33 +167,19 @@ def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> M
         for f, x in zip(one.frequency, one.shapes.T, strict=True)
     ]
     out.sort(key=lambda m: m.frequency)
-    return ModeSet(arrangement, kind, out, pairs)
+    return ModeSet(Case(kind=kind, arrangement=arrangement), out, pairs)
 
 
 def _modes(plan: ModalPlan, body: Blade, below: float) -> Modes:
     return modes(body.K, body.M, below_hz=below, solver=plan.scene.solver.name)
 
 
-def _reduce(solution: ModalSolution, stages: Stages) -> None:
-    """Craig-Bampton of both blades of the first arrangement, on whole bodies whatever the mirror
-    plane saves elsewhere.
-    """
-    plan = solution.plan
-    scene = plan.scene
-    arrangement = scene.modes.arrangements[0]
-    with stages("mesh and assembly", f"whole blades, {arrangement}"):
-        bodies = _bodies(plan, arrangement, "free", "full")
-    with stages("reduction", f"{', '.join(b.name for b in bodies)}: {scene.reduction.words} each"):
-        solution.reductions = in_parallel(
-            [partial(_reduced, solution, body) for body in bodies], plan.workers
-        )
-
-
 def _reduced(solution: ModalSolution, body: Blade) -> ReducedBlade:
+    """Craig-Bampton of a blade of the first arrangement."""
     scene = solution.plan.scene
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
     boundary = body.dofs(np.unique(kept))
-    free_modes = free_set(solution, scene.modes.arrangements[0]).modes
+    free_modes = solution.sets[scene.modes.arrangements[0], "free"].modes
     full = [m.frequency for m in free_modes if m.body.name == body.name]
     if not full:
         raise InputError(
@@ -211,52 +201,51 @@ def _reduced(solution: ModalSolution, body: Blade) -> ReducedBlade:
     return ReducedBlade(body, model, model.modes(count=len(full)).frequency, np.array(full))
 
 
-def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
-    """The modes of the blades without a damper."""
-    return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
-
-
-def _system_modes(found: ModeSet, name: str) -> tuple[Modes, Blade]:
+def _excited(found: ModeSet, name: str) -> tuple[Blade, Modes]:
     """The modes of the named body whose plane y = 0 moves in itself, the only ones a force in that
     plane excites.
     """
     body, mine = next((b, m) for b, m in found.found if b.name == name and b.family != "y")
     if not len(mine.frequency):
         raise InputError(f"modes.below: no mode of {name} below it moves along x; raise it")
-    return _on_rig(body, mine), body
+    return body, mine
 
 
-def _on_rig(body: Blade, found: Modes) -> Modes:
-    """Modes of the whole rig: half a rig has half the modal mass, its shapes are those of the whole
-    times sqrt 2.
+def _system(body: Blade, found: Modes, zeta: float) -> ModalSystem:
+    """Modes and statics of the whole rig: half a rig has half the modal mass and carries half the
+    force, its shapes are those of the whole times sqrt 2.
     """
-    return replace(found, shapes=found.shapes * (np.sqrt(0.5) if body.family else 1.0))
+    factor, part = factorise(body.K), 0.5 if body.family else 1.0
+    whole = replace(found, shapes=found.shapes * np.sqrt(part))
+    return modal_system(whole, zeta, static=lambda f: factor.solve(part * f))
 
 
 def _response(solution: ModalSolution) -> RigResponse:
     scene = solution.plan.scene
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
-    free, body = _system_modes(free_set(solution, arrangement), "right")
-    static, force, output = _static(body), body.probe("force"), body.probe("accelerometer")
-    band = (choice.start, choice.stop)
-    system = modal_system(free, choice.damping, static=static)
-    zeta = choice.damping
+    body, modes_x = _excited(solution.sets[arrangement, "free"], "right")
+    force, output = body.probe("force"), body.probe("accelerometer")
+    band, zeta = (choice.start, choice.stop), choice.damping
+    system = _system(body, modes_x, zeta)
     if choice.peak is not None:
         zeta = tune_damping(system, force, [output], choice.peak, band=band)
-        system = modal_system(free, zeta, static=static)
+        system = replace(system, zeta=np.full_like(system.zeta, zeta))
     found = frequency_response(system, force, [output], grid)
     curves = {"free": {"right": found.H[:, 0], "left": np.zeros(len(grid), complex)}}
     at, height = peak_response(system, force, [output], band)
     # One number per newton: mode and force of the peak's own mode, if one lies in the band at all.
-    inside = bool(((free.frequency >= choice.start) & (free.frequency <= choice.stop)).any())
-    nearest = free.shapes[:, int(np.argmin(np.abs(free.frequency - at)))]
+    f = system.frequency
+    inside = bool(((f >= choice.start) & (f <= choice.stop)).any())
+    nearest = system.shapes[:, int(np.argmin(np.abs(f - at)))]
     peak = (at, height) if inside else None
-    glued = next(
-        (s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None
-    )
+    glued = solution.sets.get((arrangement, "glued"))
     if glued is not None:
-        curves["glued"] = _glued(glued, zeta, grid)
+        body, modes_x = _excited(glued, "rig")
+        outputs = [body.probe(f"{side}_accelerometer") for side in ("left", "right")]
+        system = _system(body, modes_x, zeta)
+        H = frequency_response(system, body.probe("right_force"), outputs, grid).H
+        curves["glued"] = {"left": H[:, 0], "right": H[:, 1]}
     return RigResponse(
         arrangement,
         grid,
@@ -272,9 +261,9 @@ def _more_modes(solution: ModalSolution) -> Iterator[Resolved]:
     response, scene = solution.response, solution.plan.scene
     if response is None or response.peak is None:
         return
-    _, body = _system_modes(free_set(solution, response.arrangement), "right")
-    found = _on_rig(body, _modes(solution.plan, body, MORE_MODES * scene.modes.below))
-    system = modal_system(found, response.damping, static=_static(body))
+    body, _ = _excited(solution.sets[response.arrangement, "free"], "right")
+    found = _modes(solution.plan, body, MORE_MODES * scene.modes.below)
+    system = _system(body, found, response.damping)
     force, output = body.probe("force"), body.probe("accelerometer")
     band, of = (scene.response.start, scene.response.stop), q.FREE_PEAK_ACCELERANCE
     height = float(peak_response(system, force, [output], band)[1])
@@ -285,7 +274,7 @@ def _more_modes(solution: ModalSolution) -> Iterator[Resolved]:
 def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
     """First free frequency on the same mesh with the incompatible modes that hex8 leaves out."""
     plan = solution.plan
-    free = next((s for s in solution.sets if s.kind == "free" and s.modes), None)
+    free = next((s for s in solution.sets.values() if s.case.kind == "free" and s.modes), None)
     if plan.scene.mesh.element != "hex8" or free is None:
         return
     first, data = free.modes[0], plan.scene.material
@@ -297,23 +286,3 @@ def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
     yield Resolved(
         "shear locking", of.named(1), free.case, first.frequency, lowest, of.unit, remedy
     )
-
-
-def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
-    own, body = _system_modes(found, "rig")
-    outputs = [body.probe(f"{side}_accelerometer") for side in ("left", "right")]
-    H = frequency_response(
-        modal_system(own, zeta, static=_static(body)),
-        body.probe("right_force"),
-        outputs,
-        grid,
-    ).H
-    return {"left": H[:, 0], "right": H[:, 1]}
-
-
-def _static(body: Blade) -> Callable[[Array], Array]:
-    """K^-1 f of the whole body: what the modes left out contribute. Half a model carries half the
-    force.
-    """
-    factor, part = factorise(body.K), 0.5 if body.family else 1.0
-    return lambda f: factor.solve(part * f)

@@ -86,17 +86,13 @@ def _rigid(summary: Mapping[str, Any], side: str, histories: Mapping[str, Group]
 
 
 def _states(name: str, side: str, groups: list[Group]) -> Chart:
-    more: dict[str, Any] = {
-        "maps": tuple(_state(g) for g in groups),
-        "note": "In the last load step: blue sticks, orange slips, grey is open.",
-        "sheet": name in (RAISED, "lowered"),
-    }
+    maps = tuple(
+        Map(*lattice(g, 1.0), _ORDER[values(g, "state").astype(int)], Axis("state"), STATES)
+        for g in groups
+    )
+    note = "In the last load step: blue sticks, orange slips, grey is open."
+    more: dict[str, Any] = {"maps": maps, "note": note, "sheet": name in (RAISED, "lowered")}
     return face_chart("Stick and slip", groups, f"{name}, {side} face", "stick_slip", **more)
-
-
-def _state(group: Group) -> Map:
-    x, y = lattice(group, 1.0)
-    return Map(x, y, _ORDER[values(group, "state").astype(int)], Axis("state"), STATES)
 
 
 def _moved(group: Group) -> Chart:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -157,39 +157,33 @@ class Interface:
         out[:, list(self.kept)] = found.displacement
         return out
 
-    @cached_property
-    def even_forces(self) -> Array:
-        """(n,) normal forces per newton of F_C that hold the damper without friction, as evenly as
-        they can: of all that do the one with the least sum of squares over areas.
+    def worn_gap(self, centrifugal: float) -> Array:
+        """(n,) mm: gap of faces worn in under F_C, which then press as evenly as they can.
+
+        Of all normal forces that hold the damper without friction these have the least sum of
+        squares over areas. Closed everywhere under them, h = B s - C f: open most where the bodies
+        give way least.
 
         Raises
         ------
         InputError
             Where pressure alone cannot.
         """
-        A = self.columns[: self.n].T * np.sqrt(self.area)
-        load = np.zeros(len(self.kept))
+        normal, load = self.columns[: self.n], np.zeros(len(self.kept))
         load[self.kept.index(_Z)] = 1.0 / self.copies
+        A = normal.T * np.sqrt(self.area)
         size = np.linalg.norm(A, axis=1)
         eps = np.sqrt(np.finfo(float).eps)
         used = size > eps * np.where(np.array(self.kept) < 3, size[0], size.max())
         x = least_positive(A[used] / size[used, None], load[used] / size[used])
         force = np.zeros(self.n) if x is None else np.sqrt(self.area) * x
-        misfit = np.abs(self.columns[: self.n].T @ force - load)[used] / size[used]
+        misfit = np.abs(normal.T @ force - load)[used] / size[used]
         if misfit.max() > eps * (load[used] / size[used]).max():
             raise InputError(
                 "contact.fit: pressure on both faces cannot hold this damper against F_C without "
                 'friction; set contact.fit = "new"'
             )
-        return np.asarray(force)
-
-    def worn_gap(self, centrifugal: float) -> Array:
-        """(n,) mm: gap of faces worn in under F_C, which then press as evenly as they can.
-
-        Closed everywhere under the even forces f, h = B s - C f: open most where the bodies give
-        way least.
-        """
-        w = self.compliance[: self.n, : self.n] @ (centrifugal * self.even_forces)
+        w = self.compliance[: self.n, : self.n] @ (centrifugal * force)
         return np.asarray(w.max() - w)
 
     # -- stuck stiffness ---------------------------------------------------------------------------

@@ -19,7 +19,6 @@ from upd.analyses.seated.results import platform_force
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.contact.patch import Patch, make_patch
-from upd.mesh import IntArray
 from upd.results import Group, variable
 from upd.scene.forced_contact import SIDES, Side
 
@@ -29,11 +28,6 @@ HISTORY, FACE, MOVED = "seating", "face", "moved"
 #: the phases that are one history
 SEATING = (RAISED, LOWERED, AGAIN)
 _STATES = "open stick slip"
-
-
-def sizes(solution: SeatedSolution) -> dict[str, int]:
-    """Nodes of both faces in the model."""
-    return {"n_pairs": solution.interface.n}
 
 
 def arrays(solution: SeatedSolution) -> dict[str, Group]:
@@ -87,7 +81,7 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
     for j in of.kept:
         kind, unit = ("u", "mm") if j < 3 else ("r", "rad")
         out[f"damper_{kind}{'xyz'[j % 3]}"] = variable(step, motion[:, j], unit)
-    loss = of.copies * np.cumsum(phase.friction_loss)
+    loss = of.copies * np.cumsum(found.friction_loss(phase.before))
     out["friction_loss"] = variable(step, loss, "N mm", "since the first step")
     return out
 
@@ -125,24 +119,22 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, str, Patch]]:
         mine = np.flatnonzero(of.face == k)
         points = np.column_stack([along, up - up[mine].min()])
         found = []
-        for part in _joined(solution.bodies.blades[side].mesh.faces["patch"][:, :4]):
+        # parts that hang together by quads of nodes, which are counted by their numbers
+        quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
+        at = np.unique(quads, return_inverse=True)[1].reshape(quads.shape)
+        links = coo_array(
+            (np.ones(at.size), (np.repeat(at[:, 0], 4), at.ravel())), shape=(len(mine),) * 2
+        )
+        count, part = connected_components(links, directed=False)
+        for nodes in (mine[part == number] for number in range(count)):
             # the line on the plane once
-            on_plane = half and bool((along[mine[part]] == 0.0).any())
-            patch = make_patch(points, of.area, (on_plane, False), mine[part])
+            on_plane = half and bool((along[nodes] == 0.0).any())
+            patch = make_patch(points, of.area, (on_plane, False), nodes)
             found += [patch, patch.image()] if half and not on_plane else [patch]
         found.sort(key=lambda one: float(one.X[0]))
         names = [f"pad {i + 1}" for i in range(len(found))] if len(found) > 1 else [""]
         out += [(side, name, one) for name, one in zip(names, found, strict=True)]
     return out
-
-
-def _joined(quads: IntArray) -> list[IntArray]:
-    """Which of the nodes of quads, counted by their numbers, hang together, part by part."""
-    at = np.unique(quads, return_inverse=True)[1].reshape(quads.shape)
-    pairs = np.repeat(at[:, 0], 4), at.ravel()
-    links = coo_array((np.ones(at.size), pairs), shape=(int(at.max()) + 1,) * 2)
-    count, part = connected_components(links, directed=False)
-    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:

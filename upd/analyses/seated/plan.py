@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -61,16 +61,16 @@ class Way:
         What is done.
     centrifugal : (k,) ndarray
         F_C after each step, N.
-    moved : (k, 3) ndarray
-        Shift of what holds the right blade after each step, mm.
     after
         The way whose state it starts from; "": nothing pressed.
+    moved : (k, 3) ndarray
+        Shift of what holds the right blade after each step, mm; (1, 3) zeros where it stays.
     """
 
     name: str
     centrifugal: Array
-    moved: Array
     after: str = RAISED
+    moved: Array = field(default_factory=lambda: np.zeros((1, 3)))
 
 
 def ways(scene: SeatedScene) -> list[list[Way]]:
@@ -80,29 +80,25 @@ def ways(scene: SeatedScene) -> list[list[Way]]:
     F, s = scene.damper.centrifugal, scene.seating
     raised = F * np.arange(1, s.steps + 1) / s.steps
     lowered, back = _legs(s.steps, 1.0, s.lowest), _legs(s.steps, s.lowest, 1.0)
-    rows = [[_still(RAISED, raised, "")]]
-    rows.append([_still(LOWERED, F * lowered), _still(AGAIN, F * back, LOWERED)])
+    rows = [[Way(RAISED, raised, "")]]
+    rows.append([Way(LOWERED, F * lowered), Way(AGAIN, F * back, LOWERED)])
     if scene.wants("band"):
-        rows.append([_still(OVER, F * _legs(s.steps, 1.0, s.over, 1.0))])
+        rows.append([Way(OVER, F * _legs(s.steps, 1.0, s.over, 1.0))])
         rows.append([shaken(scene)])
-        rows.append([_still(SMOOTH, np.array([F]), "")])
+        rows.append([Way(SMOOTH, np.array([F]), "")])
     m = scene.moved
     # out to the amplitude, then whole cycles, in even steps
     out, cycle = _legs(m.steps, 0.0, 1.0), _legs(2 * m.steps, *[1.0, -1.0] * m.cycles, 1.0)
     for axis in m.directions if scene.wants("moved") else ():
         way = m.amplitude * np.concatenate([out, cycle])
         moved = np.outer(way, np.arange(3) == "xyz".index(axis))
-        rows.append([Way(f"moved along {axis}", np.full(len(moved), F), moved)])
+        rows.append([Way(f"moved along {axis}", np.full(len(moved), F), moved=moved)])
     return rows
 
 
 def _legs(steps: int, *ends: float) -> Array:
     """From each end to the next in even steps."""
     return np.concatenate([np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(ends)])
-
-
-def _still(name: str, centrifugal: Array, after: str = RAISED) -> Way:
-    return Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
 
 
 def shaken(scene: SeatedScene) -> Way:
@@ -112,7 +108,7 @@ def shaken(scene: SeatedScene) -> Way:
     moved = np.zeros((len(t), 3))
     moved[:, 0] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
     moved[-1] = 0.0
-    return Way(SHAKEN, np.full(len(t), scene.damper.centrifugal), moved)
+    return Way(SHAKEN, np.full(len(t), scene.damper.centrifugal), moved=moved)
 
 
 # -- the plan --------------------------------------------------------------------------------------
@@ -128,15 +124,6 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
     return SeatedPlan.of(cost, symmetry, parameters, _effects(scene, symmetry), needs, _FILES_S)
 
 
-def load_steps(scene: SeatedScene) -> int:
-    """Load steps of all that is asked for, and of what is solved again."""
-    steps = sum(len(way.centrifugal) for row in ways(scene) for way in row)
-    if scene.left_out.solves:
-        steps += scene.seating.steps * (scene.contact.worn < 1.0)
-        steps += 0 if scene.wants("band") else len(shaken(scene).moved)
-    return steps
-
-
 def _add_contact(cost: CostModel, scene: SeatedScene) -> None:
     """Bodies condensed onto their faces, and the load steps of these."""
     twice = scene.wants("stiffness") and scene.blades.held == "bases"
@@ -149,7 +136,11 @@ def _add_contact(cost: CostModel, scene: SeatedScene) -> None:
     calls = 1 + sum(map(len, ways(scene)))
     step = _FACTORS * 2.0 / 3.0 * (_CLOSED * m) ** 3 + _NEWTON_PASSES * m**2
     cost.seconds += dense_s(calls * _CHECKS * m**3)
-    cost.seconds += load_steps(scene) * (_STEP_S + dense_s(step))
+    steps = sum(len(way.centrifugal) for row in ways(scene) for way in row)
+    if scene.left_out.solves:
+        steps += scene.seating.steps * (scene.contact.worn < 1.0)
+        steps += 0 if scene.wants("band") else len(shaken(scene).centrifugal)
+    cost.seconds += steps * (_STEP_S + dense_s(step))
     cost.kept_bytes += _MATRICES * 8.0 * m**2
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from upd.analyses.base import conditions
 from upd.analyses.seated.bodies import RIGID, rigid_balance
-from upd.analyses.seated.interface import Array, Interface
+from upd.analyses.seated.interface import Array
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
@@ -151,13 +151,13 @@ def _losses(solution: SeatedSolution) -> Iterator[Result]:
     of = solution.interface
     loop = [one for name, one in solution.phases.items() if name in (LOWERED, AGAIN)]
     if len(loop) == 2:
-        loss = of.copies * sum(float(one.friction_loss.sum()) for one in loop)
+        loss = of.copies * sum(float(one.found.friction_loss(one.before).sum()) for one in loop)
         yield q.SEATING_LOSS.of(loss, Case(name=f"{LOWERED} and {AGAIN}"))
     moved = [p for p in solution.phases.values() if p.moved.any() and p.name not in WAYS]
     for phase in moved:
         last = 4 * solution.plan.scene.moved.steps
         axis = int(np.flatnonzero(phase.moved.any(axis=0))[0])
-        cycle = phase.friction_loss[-last:]
+        cycle = phase.found.friction_loss(phase.before)[-last:]
         yield q.FRICTION_ENERGY.of(of.copies * float(cycle.sum()), phase.case)
         force = platform_force(solution, phase)[-last:, axis]
         way = phase.moved[-last:, axis]
@@ -231,19 +231,14 @@ def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
 
 def _kinematics(solution: SeatedSolution, phase: Phase) -> tuple[Array, Array]:
     """Gap (k, n) and slip of each step (k, n, 2) in mm, from forces and motions."""
-    of, found, before = solution.interface, phase.found, phase.before
-    w = _motion(of, found.force, found.displacement, phase.moved)
-    n = of.n
-    gap = solution.gap - w[:, :n]
-    at = _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
-    ways = np.vstack((at, w))[:, n:].reshape(-1, 2, n).transpose(0, 2, 1)
-    return gap, np.diff(ways, axis=0)
-
-
-def _motion(of: Interface, force: Array, motion: Array, moved: Array) -> Array:
-    """(k, 3 n) mm of the damper's nodes into the blades' faces and along them."""
-    f = force.transpose(0, 2, 1).reshape(len(force), -1)
-    return np.asarray(motion @ of.columns.T - f @ of.compliance - moved @ of.shifts(1).T)
+    of, found, before, n = solution.interface, phase.found, phase.before, solution.interface.n
+    # from the state before the first step: of the damper's nodes into the faces and along them
+    force = np.concatenate([before.force[None], found.force]).transpose(0, 2, 1)
+    w = np.vstack([before.motion, found.displacement]) @ of.columns.T
+    w -= force.reshape(len(force), -1) @ of.compliance
+    w[1:] -= phase.moved @ of.shifts(1).T
+    ways = w[:, n:].reshape(-1, 2, n).transpose(0, 2, 1)
+    return solution.gap - w[1:, :n], np.diff(ways, axis=0)
 
 
 def _stick_misfit(state: np.ndarray, shear: Array, step: Array) -> float:

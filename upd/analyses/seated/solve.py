@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -55,11 +55,6 @@ class Phase(Way):
         """What its numbers belong to."""
         return Case(name=self.name)
 
-    @property
-    def friction_loss(self) -> Array:
-        """(k,) N mm that friction took in each step of the model."""
-        return self.found.friction_loss(self.before)
-
 
 @dataclass
 class SeatedSolution:
@@ -105,11 +100,17 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     worn, F = scene.contact.worn, scene.damper.centrifugal
     gap = worn * of.worn_gap(F) if worn else np.zeros(of.n)
     solution = SeatedSolution(plan, bodies, of, gap)
-    (raised,), *others = ways(scene)
+    first, *others = ways(scene)
     with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
-        _phase(solution, raised)
+        _load(solution, first)
     with keeping(solution):
-        _go_on(solution, others, stages)
+        names = [way.name for row in others for way in row]
+        steps = sum(len(way.centrifugal) for row in others for way in row)
+        with stages("seating", f"{', '.join(names)}: {steps} load steps"):
+            # each row from the raised state, and so side by side
+            in_parallel([partial(_load, solution, row) for row in others], 2)
+        # in the order of the report, whichever ended first
+        solution.phases = {name: solution.phases[name] for name in (RAISED, *names)}
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
                 solution.platforms = (
@@ -118,62 +119,48 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
                     else make_interface(plan, bodies, "platforms", like=of)
                 )
         if scene.left_out.solves:
-            solution.omissions = list(_solve_again(solution, stages))
+            solution.omissions = _solve_again(solution, stages)
     return solution
 
 
-def _go_on(solution: SeatedSolution, rows: Sequence[Sequence[Way]], stages: Stages) -> None:
-    """F_C lowered and raised again, and every other way that is asked for: each from the raised
-    state, and so side by side.
-    """
-    names = [way.name for row in rows for way in row]
-    steps = sum(len(way.centrifugal) for row in rows for way in row)
-
-    def done(row: Sequence[Way]) -> None:
-        for way in row:
-            _phase(solution, way)
-
-    with stages("seating", f"{', '.join(names)}: {steps} load steps"):
-        in_parallel([partial(done, row) for row in rows], 2)
-    # In the order of the report, whichever ended first.
-    solution.phases = {name: solution.phases[name] for name in (RAISED, *names)}
-
-
-def _phase(solution: SeatedSolution, way: Way) -> None:
-    """Solve one way of loading."""
-    of, friction = solution.interface, solution.plan.scene.contact.friction
-    if way.after:
-        last = solution.phases[way.after].found
-        before, moved = last.history, way.moved if way.moved.any() else None
-        found = of.seat(friction, way.centrifugal, moved=moved, after=last)
-    else:
-        friction = 0.0 if way.name == SMOOTH else friction
-        found = of.seat(friction, way.centrifugal, gap=solution.gap)
-        none, still = np.zeros((of.n, 3)), np.zeros(len(of.kept))
-        before = CoupledHistory(none, none[:, 1:], solution.gap, still, none[:, 1:], still)
-    solution.phases[way.name] = Phase(**vars(way), friction=friction, found=found, before=before)
+def _load(solution: SeatedSolution, row: Sequence[Way]) -> None:
+    """Solve ways of loading, one after the other."""
+    of, mu = solution.interface, solution.plan.scene.contact.friction
+    for way in row:
+        friction = 0.0 if way.name == SMOOTH else mu
+        if way.after:
+            last = solution.phases[way.after].found
+            before, moved = last.history, way.moved if way.moved.any() else None
+            found = of.seat(friction, way.centrifugal, moved=moved, after=last)
+        else:
+            found = of.seat(friction, way.centrifugal, gap=solution.gap)
+            none, still = np.zeros((of.n, 3)), np.zeros(len(of.kept))
+            before = CoupledHistory(none, none[:, 1:], solution.gap, still, none[:, 1:], still)
+        phase = Phase(**vars(way), friction=friction, found=found, before=before)
+        solution.phases[way.name] = phase
 
 
-def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:
+def _solve_again(solution: SeatedSolution, stages: Stages) -> list[Resolved]:
     """Normal forces of the faces with the effects omitted."""
     scene, of = solution.plan.scene, solution.interface
-    without = solution.forces(RAISED)[:, 0]
+    without, found = solution.forces(RAISED)[:, 0], list[tuple[str, float, str]]()
     side = int(np.argmax(without))
-    case = Case(name=RAISED, side=SIDES[side])
-
-    def resolved(effect: str, included: float, remedy: str) -> Resolved:
-        return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
-
     if scene.contact.worn < 1.0:
         gap, raised = of.worn_gap(scene.damper.centrifugal), solution.phases[RAISED].centrifugal
         with stages("seating", "on worn faces"):
-            found = of.seat(scene.contact.friction, raised, gap=gap)
-        included = float(of.face_forces(found)[-1, side, 0])
-        yield resolved(WORN, included, 'set contact.fit = "worn"')
+            worn = of.seat(scene.contact.friction, raised, gap=gap)
+        included = float(of.face_forces(worn)[-1, side, 0])
+        found.append((WORN, included, 'set contact.fit = "worn"'))
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:
             with stages("seating", SHAKEN):
-                _phase(solution, shaken(scene))
+                _load(solution, [shaken(scene)])
         included = float(solution.forces(SHAKEN)[side, 0])
         del solution.phases[SHAKEN]
-        yield resolved(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')
+        remedy = 'friction leaves the state open: add "band" to want'
+        found.append((OTHER_WAYS, included, remedy))
+    case, force = Case(name=RAISED, side=SIDES[side]), float(without[side])
+    return [
+        Resolved(effect, "face_N", case, force, included, "N", remedy)
+        for effect, included, remedy in found
+    ]

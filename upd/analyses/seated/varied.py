@@ -51,10 +51,6 @@ def _steps(scene: SeatedScene, factor: float) -> Overrides:
     )
 
 
-def _finer(plan: SeatedPlan, source: str, factor: float) -> Overrides:
-    return refined(plan.scene, factor) if source == MESH else _steps(plan.scene, factor)
-
-
 def corrected(solution: SeatedSolution, numbers: Sequence[Result], found: Estimates) -> Estimates:
     """The parts by variations, of shares not below a spacing of nodes; none of what is rounding.
 
@@ -77,27 +73,21 @@ def corrected(solution: SeatedSolution, numbers: Sequence[Result], found: Estima
             else part
             for part in out.get(key, ())
         )
-    for one in numbers:
-        held = _held(solution, one)
-        if not one.withheld and 0.0 < abs(one.value) <= held:
-            why = f"not estimated: zero but for rounding, which may be {held:.2g} {one.unit}"
-            out[one.name, one.case] = (ErrorPart(MESH, float("nan"), why),)
-    return out
-
-
-def _held(solution: SeatedSolution, one: Result) -> float:
-    """What rounding leaves of a force, a loss or the stiffness of a motion: shares of F_C, of its
-    work along the motion, and of F_C over it.
-    """
-    scene = solution.plan.scene
-    force, way = scene.damper.centrifugal, scene.moved.amplitude
+    # what rounding leaves of a force, a loss or the stiffness of a motion: shares of F_C, of its
+    # work along the motion, and of F_C over it
+    force, way = solution.plan.scene.damper.centrifugal, solution.plan.scene.moved.amplitude
     lift = np.abs(solution.interface.motions(solution.phases[RAISED].found)[-1, :3]).max()
-    held = {
+    rounding = {
         q.FRICTION_ENERGY.name: _OF_WORK * force * way,
         q.SEATING_LOSS.name: _OF_WORK * force * float(lift),
         q.MOVED_STIFFNESS.name: ROUNDING * force / way,
     }
-    return held.get(one.name, ROUNDING * force if one.unit == "N" else 0.0)
+    for one in numbers:
+        most = rounding.get(one.name, ROUNDING * force if one.unit == "N" else 0.0)
+        if not one.withheld and 0.0 < abs(one.value) <= most:
+            why = f"not estimated: zero but for rounding, which may be {most:.2g} {one.unit}"
+            out[one.name, one.case] = (ErrorPart(MESH, float("nan"), why),)
+    return out
 
 
 def edges(solution: SeatedSolution) -> Mapping[Key, float]:
@@ -127,7 +117,16 @@ def _edge(inside: NDArray[np.bool_], quads: IntArray, area: NDArray[np.float64])
     return float(area[at_edge & inside].sum() / area[inside].sum())
 
 
-PROBLEM = Problem(make_plan, solve, make_results, levels=levels, finer=_finer, corrected=corrected)
+PROBLEM = Problem(
+    make_plan,
+    solve,
+    make_results,
+    levels=levels,
+    finer=lambda plan, source, factor: (
+        refined(plan.scene, factor) if source == MESH else _steps(plan.scene, factor)
+    ),
+    corrected=corrected,
+)
 
 
 # -- convergence studies --------------------------------------------------------------------------
