@@ -49,7 +49,7 @@ def close(a: FloatArray | float, b: FloatArray | float) -> bool:
 def test_totals_are_kept(weight: Weight, rows: int, columns: int) -> None:
     X, area = grid(13, 9)
     force, k_n, k_t = random_fields(117)
-    law = contact_points(X, area, force, k_n, k_t, rows, columns, weight)
+    law = contact_points(X, area, force, k_n, k_t, (rows, columns), weight)
     assert close(law.preload.sum(), force.sum())
     assert close(law.area.sum(), area.sum())
     assert close(law.k_n.sum(), k_n.sum())
@@ -63,7 +63,7 @@ def test_totals_are_kept(weight: Weight, rows: int, columns: int) -> None:
 def test_one_point_is_the_whole_patch() -> None:
     X, area = grid(5, 4)
     force, k_n, k_t = random_fields(20)
-    law = contact_points(np.column_stack([X, np.full(20, 7.0)]), area, force, k_n, k_t, 1, 1)
+    law = contact_points(np.column_stack([X, np.full(20, 7.0)]), area, force, k_n, k_t, (1, 1))
     assert (
         law.n_point == 1
         and close(law.position[0, :2], k_n @ X / k_n.sum())
@@ -78,7 +78,7 @@ def test_a_node_on_a_border_is_shared_by_hand() -> None:
     """
     X, area = grid(3, 3, 2.0, 2.0)
     k_n = np.arange(1.0, 10.0)
-    law = contact_points(X, area, k_n, k_n, np.column_stack([2 * k_n, 3 * k_n]), 2, 2)
+    law = contact_points(X, area, k_n, k_n, np.column_stack([2 * k_n, 3 * k_n]), (2, 2))
     expected = np.array(
         [
             1 + 2 / 2 + 4 / 2 + 5 / 4,
@@ -107,8 +107,7 @@ def test_area_weight_by_hand() -> None:
         force,
         k_n,
         np.column_stack([k_n, k_n]),
-        2,
-        2,
+        (2, 2),
         "area",
         [np.arange(9), np.arange(9, 18)],
     )
@@ -132,8 +131,7 @@ def test_a_symmetric_patch_gives_symmetric_points(weight: Weight, rows: int, col
         both,
         *(np.tile(v, 2) for v in (area, force, k_n)),
         np.tile(k_t, (2, 1)),
-        rows,
-        columns,
+        (rows, columns),
         weight,
         [np.arange(70), np.arange(70, 140)],
     )
@@ -155,16 +153,16 @@ def test_empty_cells_make_no_point_and_open_cells_stay() -> None:
     X, area = grid(4, 3)
     k_n = np.ones(12)
     k_n[0] = 0.0
-    law = contact_points(X, area, k_n, k_n, np.column_stack([k_n, k_n]), 29, 31)
+    law = contact_points(X, area, k_n, k_n, np.column_stack([k_n, k_n]), (29, 31))
     assert law.n_point == 12 and close(law.k_n, k_n) and close(law.area, area)
     assert close(law.position[:, :2], X)
-    bare = contact_points(X, np.r_[0.0, area[1:]], k_n, k_n, np.column_stack([k_n, k_n]), 29, 31)
+    bare = contact_points(X, np.r_[0.0, area[1:]], k_n, k_n, np.column_stack([k_n, k_n]), (29, 31))
     assert bare.n_point == 11
 
 
 def test_one_line_of_nodes() -> None:
     X = np.column_stack([np.arange(5.0), np.full(5, 3.0)])
-    law = contact_points(X, np.ones(5), np.ones(5), np.ones(5), np.ones((5, 2)), 2, 5)
+    law = contact_points(X, np.ones(5), np.ones(5), np.ones(5), np.ones((5, 2)), (2, 5))
     assert close(law.k_n, np.full(10, 0.5)) and close(law.position[:, 1], np.full(10, 3.0))
 
 
@@ -184,7 +182,7 @@ def test_tilt_stiffness_lost_by_few_points(rows: int, columns: int) -> None:
     # Corner nodes without stiffness make the bounding box that of the cells.
     X = np.vstack([np.column_stack([np.tile(c, n), np.repeat(c, n)]), [[0.0, 0.0], [width, width]]])
     k = np.r_[np.ones(n * n), 0.0, 0.0]
-    law = contact_points(X, k, k, k, np.column_stack([k, k]), rows, columns)
+    law = contact_points(X, k, k, k, np.column_stack([k, k]), (rows, columns))
     # Within a cell the lattice of m lines has (1 - 1/m^2) of the moment of the continuum.
     lost = [(1 / r**2 - 1 / n**2) / (1 - 1 / n**2) for r in (columns, rows)]
     own = second_moments(law.position[:, :2], law.k_n)
@@ -194,14 +192,14 @@ def test_tilt_stiffness_lost_by_few_points(rows: int, columns: int) -> None:
 def test_as_many_points_as_nodes_lose_nothing() -> None:
     X, area = grid(6, 5)
     force, k_n, k_t = random_fields(30, 2)
-    law = contact_points(X, area, force, k_n, k_t, 40, 40)
+    law = contact_points(X, area, force, k_n, k_t, (40, 40))
     own = second_moments(law.position[:, :2], law.k_n)
     assert np.abs(own / second_moments(X, k_n) - 1.0).max() <= 1e3 * EPS
 
 
 def test_placed_in_other_axes_and_back() -> None:
     X, area = grid(9, 7)
-    law = contact_points(X, area, *random_fields(63), 2, 3)
+    law = contact_points(X, area, *random_fields(63), (2, 3))
     s = np.sqrt(0.5)
     axes = np.array([[0.0, 1.0, 0.0], [-s, 0.0, s], [s, 0.0, s]])
     origin = np.array([10.0, -4.0, 2.5])
@@ -221,7 +219,7 @@ def test_placed_in_other_axes_and_back() -> None:
 
 def test_through_result_nc(tmp_path: Path) -> None:
     X, area = grid(9, 7)
-    law = contact_points(X, area, *random_fields(63), 2, 3).placed([1.0, 2.0, 3.0], np.eye(3))
+    law = contact_points(X, area, *random_fields(63), (2, 3)).placed([1.0, 2.0, 3.0], np.eye(3))
     lattice = {"x": (("x",), np.arange(3.0), {"units": "mm"})}
     write_netcdf(tmp_path / "result.nc", {"F_N 150 N": Group(lattice | law.to_arrays())})
     read = ContactLaw.from_arrays(read_netcdf(tmp_path / "result.nc")["F_N 150 N"])
@@ -234,7 +232,7 @@ def test_through_result_nc(tmp_path: Path) -> None:
 
 def test_arrays_that_are_no_law() -> None:
     X, area = grid(3, 3)
-    arrays: dict[str, Any] = contact_points(X, area, *random_fields(9), 2, 2).to_arrays()
+    arrays: dict[str, Any] = contact_points(X, area, *random_fields(9), (2, 2)).to_arrays()
     del arrays["law_k_n"]
     arrays["law_preload"] = np.ones(3)
     with pytest.raises(InputError, match=r"law_k_n is missing.*law_preload has shape \(3,\)"):
@@ -244,8 +242,8 @@ def test_arrays_that_are_no_law() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rows": 0}, "rows is 0"),
-        ({"columns": 1.5}, "columns is 1.5"),
+        ({"grid": (0, 2)}, "rows is 0"),
+        ({"grid": (2, 1.5)}, "columns is 1.5"),
         ({"weight": "pressure"}, "weight is 'pressure'"),
         ({"positions": np.zeros(9)}, r"positions has shape \(9,\)"),
         ({"areas": np.ones(8)}, r"areas has shape \(8,\)"),
@@ -272,8 +270,7 @@ def test_input_faults(change: dict[str, Any], message: str) -> None:
         "normal_force": force,
         "normal_stiffness": k_n,
         "tangential_stiffness": k_t,
-        "rows": 2,
-        "columns": 2,
+        "grid": (2, 2),
     }
     with pytest.raises(InputError, match=message):
         contact_points(**(arguments | change))

@@ -59,7 +59,7 @@ class ContactLaw(Shown):
     >>> law = contact_points(
     ...     positions=[[-1.0, 0.0], [1.0, 0.0]], areas=[1.0, 1.0], normal_force=[5.0, 5.0],
     ...     normal_stiffness=[100.0, 100.0], tangential_stiffness=np.full((2, 2), 80.0),
-    ...     rows=1, columns=2,
+    ...     grid=(1, 2),
     ... )
     >>> law.n_point
     2
@@ -178,14 +178,13 @@ def contact_points(
     normal_force: ArrayLike,
     normal_stiffness: ArrayLike,
     tangential_stiffness: ArrayLike,
-    rows: int,
-    columns: int,
+    grid: tuple[int, int],
     weight: Weight = "stiffness",
     patches: Sequence[ArrayLike] | None = None,
 ) -> ContactLaw:
     """Contact points of a dynamic model from nodal fields of a contact solution.
 
-    Each patch is cut into `rows` (along y) by `columns` (along x) equal cells of its bounding box;
+    Each patch is cut into rows (along y) by columns (along x) of equal cells of its bounding box;
     a node on a border of cells is shared equally between them. Sums over the points are the sums of
     the fields. Cells in which everything is zero make no point.
 
@@ -201,7 +200,7 @@ def contact_points(
         Normal stiffnesses [N/mm].
     tangential_stiffness : (n, 2) array_like
         Stiffnesses along x and y [N/mm].
-    rows, columns : int
+    grid : (rows, columns)
         Number of cells along y and along x.
     weight : {"stiffness", "area"}
         The preload and the area of a point are the sums over its cell. With "stiffness" so are the
@@ -233,8 +232,7 @@ def contact_points(
     ...     normal_force=[1.0, 2.0, 2.0, 1.0],
     ...     normal_stiffness=np.full(4, 100.0),
     ...     tangential_stiffness=np.full((4, 2), 80.0),
-    ...     rows=1,
-    ...     columns=2,
+    ...     grid=(1, 2),
     ... )
     >>> law.position.tolist()
     [[0.5, 0.0, 0.0], [2.5, 0.0, 0.0]]
@@ -247,7 +245,7 @@ def contact_points(
     K = _not_negative(problems, "tangential_stiffness", tangential_stiffness, (n, 2))
     named = {"areas": areas, "normal_force": normal_force, "normal_stiffness": normal_stiffness}
     given = [_not_negative(problems, name, values, (n,)) for name, values in named.items()]
-    for name, count in (("rows", rows), ("columns", columns)):
+    for name, count in zip(("rows", "columns"), grid, strict=True):
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
         problems.add(not whole or count < 1, f"{name} is {count!r}: give a whole number >= 1.")
     problems.add(
@@ -258,7 +256,7 @@ def contact_points(
     assert X is not None and K is not None
     place = np.column_stack([X, np.zeros(len(X))]) if X.shape[1] == 2 else X
     fields = (place, *(np.asarray(one) for one in given), K)
-    cells = [_cells([f[group] for f in fields], rows, columns, weight) for group in groups]
+    cells = [_cells([f[group] for f in fields], *grid, weight) for group in groups]
     law = {name: np.concatenate([cell[name] for cell in cells]) for name in cells[0]}
     m = len(law["k_n"])
     if m == 0:

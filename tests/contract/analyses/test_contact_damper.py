@@ -107,8 +107,7 @@ def test_a_run_is_compared_by_the_scene_in_its_folder(tmp_path: Path) -> None:
         normal_force=[5.0, 5.0],
         normal_stiffness=[100.0, 100.0],
         tangential_stiffness=np.full((2, 2), 80.0),
-        rows=1,
-        columns=2,
+        grid=(1, 2),
     )
     group = Group(law.to_arrays(), content="contact law")
     write_netcdf(tmp_path / "result.nc", {"contact law F=5 N": group})

@@ -345,8 +345,7 @@ def contact_law(solution: ContactSolution, case: NormalCase) -> ContactLaw | Non
         share * force.sum(),
         share * answer.solution.stiffness,
         np.outer(share, [sheared(0.0), sheared(90.0)]),
-        choice.rows,
-        choice.columns,
+        (choice.rows, choice.columns),
         choice.weight,
         np.split(np.arange(ends[-1]), ends[:-1]),
     )
