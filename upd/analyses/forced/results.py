@@ -55,7 +55,7 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     for name, found in solution.performances.items():
         results += performance.performance_results(name, found)
     for mode in solution.nonlinear_modes:
-        results += performance.mode_results(mode)
+        results += performance.mode_results(*mode)
     scene, beside = solution.plan.scene, (partial(_computed, solution), partial(_nothing, solution))
     results += solution.effects
     return results + measured.measured_results(scene.measured, *beside, scene.excitation.damping)
@@ -417,7 +417,7 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
     for name, found in solution.performances.items():
         add(PERFORMANCE, name, performance.performance_arrays(found))
     for mode in solution.nonlinear_modes:
-        add(MODES, mode.case, performance.mode_arrays(mode))
+        add(MODES, *mode)
     return out | (measured.measured_arrays(scene.measured) if out else {})
 
 
