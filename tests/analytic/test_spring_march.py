@@ -52,7 +52,7 @@ def solution() -> ForcedSolution:
 
 def test_the_stuck_march_is_the_stuck_blades(solution: ForcedSolution) -> None:
     model = solution.models["thesis"]
-    springs = spring_march(model, 0.005, model.n, 4)
+    springs = spring_march(model, 0.005, len(model.K), 4)
     f = np.linspace(300.0, 500.0, 41)
     found = springs.march.linear_response(f, [1.0], stuck=True)[:, :2]
     moved = stuck_motion(model, f)

@@ -94,29 +94,25 @@ def with_tops(
     plan: ForcedPlan, model: Model, linear: LinearCurves, curve: PointCurve
 ) -> PointCurve:
     """The curve with its peaks between the points of the path."""
-    stop, answer = plan.scene.excitation.stop, curve.answer
+    stop, a = plan.scene.excitation.stop, curve.answer
     peaks: dict[Side, tuple[CurvePeak, ...]] = {}
     tops: dict[tuple[Side, int], Top] = {}
     for side in SIDES:
-        size, mine = np.abs(curve.accelerance[side]), []
-        for peak in numbered_peaks(model, answer, size, stop):
-            top = _top(model, linear, curve, side, peak)
+        size, mine, limits = np.abs(curve.accelerance[side]), [], linear.stuck_peaks[side]
+        for peak in numbered_peaks(model, a, size, stop):
+            i, top = peak.sample, None
+            if a.linear[max(i - 1, 0) : i + 2].all() and limits:
+                near = min(limits, key=lambda p: abs(p.frequency - peak.frequency))
+                top = Top(near.frequency, near.height, a.x[i], False)
+            else:
+                f = float(a.frequency[i])
+                top = climbed(model, a.balance, a.x[i], f, side, curve.force, peak)
             if top is not None:
                 peak = peak._replace(frequency=top.frequency, height=top.height)
                 tops[side, peak.number] = top
             mine.append(peak)
         peaks[side] = tuple(mine)
     return replace(curve, peaks=peaks, tops=tops)
-
-
-def _top(
-    model: Model, linear: LinearCurves, curve: PointCurve, side: Side, peak: CurvePeak
-) -> Top | None:
-    a, i = curve.answer, peak.sample
-    if a.linear[max(i - 1, 0) : i + 2].all() and linear.stuck_peaks[side]:
-        near = min(linear.stuck_peaks[side], key=lambda p: abs(p.frequency - peak.frequency))
-        return Top(near.frequency, near.height, a.x[i], False)
-    return climbed(model, a.balance, a.x[i], float(a.frequency[i]), side, curve.force, peak)
 
 
 def climbed(
@@ -285,7 +281,7 @@ def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
     """Points of the path from a top down to half its power on either side, the side first on which
     the frequency rises along the path.
     """
-    ways, up = [], curve.rising
+    ways, up = [], rising(curve.frequency)
     for step in (1, -1):
         way = [top]
         while 0 <= way[-1] + step < len(size) and size[way[-1]] > LEAST * size[top]:

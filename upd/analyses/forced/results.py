@@ -14,7 +14,14 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures, performance
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, Limit, LinearCurves, faces_limit, point_limit
+from upd.analyses.forced.curves import (
+    ForcedCurve,
+    Limit,
+    LinearCurves,
+    faces_limit,
+    point_limit,
+    rising,
+)
 from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
@@ -459,7 +466,7 @@ def _curve_arrays(curve: ForcedCurve[Any]) -> Variables:
             out[f"peak_accelerance_{side}"] = variable(at, height, "(m/s2)/N")
     if isinstance(a, FrequencyResponse):
         words = "0 between two folds, where the frequency falls"
-        return out | {"stable": variable(on, curve.rising.astype(np.int8), "1", words)}
+        return out | {"stable": variable(on, rising(curve.frequency).astype(np.int8), "1", words)}
     if isinstance(a, InterfaceResponse):
         jumped = np.zeros(len(curve.frequency), np.int8)
         jumped[list(a.jumps)] = 1
