@@ -134,28 +134,6 @@ class TimeCheck:
         return abs(self.integrated / self.balance - 1.0) if self.stays else float("inf")
 
 
-class Fold(NamedTuple):
-    """Where a slow sweep jumps: the end of a branch, and the highest it reaches after the jump.
-
-    Attributes
-    ----------
-    frequency
-        Hz.
-    up
-        Whether the frequency rises.
-    before, reached
-        Heights of the right blade at the end of the branch and after the jump, (m/s2)/N.
-    at
-        Hz, where that is.
-    """
-
-    frequency: float
-    up: bool
-    before: float
-    reached: float
-    at: float
-
-
 #: harmonic balance of points or of whole faces, or a sweep
 Answer = TypeVar("Answer", FrequencyResponse, InterfaceResponse, SteppedSine)
 #: ways along which a curve is swept; "" by harmonic balance
@@ -191,7 +169,8 @@ class ForcedCurve(Generic[Answer]):
     checked
         Peaks on which a point slips or opens, by time integration.
     folds
-        Along the path.
+        Where a slow sweep up jumps: the end of a branch of the right blade, and the highest that it
+        reaches after the jump.
     periods
         Number of a peak of the right blade -> the last period there, of a sweep.
     """
@@ -207,7 +186,7 @@ class ForcedCurve(Generic[Answer]):
     way: Way = ""
     tops: Mapping[tuple[Side, int], Top] = field(default_factory=dict)
     checked: tuple[TimeCheck, ...] = ()
-    folds: tuple[Fold, ...] = ()
+    folds: tuple[tuple[CurvePeak, CurvePeak], ...] = ()
     periods: Mapping[int, RecordedPeriod] = field(default_factory=dict)
 
     @property

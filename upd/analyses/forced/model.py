@@ -126,14 +126,6 @@ class Model:
             K = K + points.B.T @ (stuck_stiffness(points).ravel()[:, None] * points.B)
         return M, C, K, points.B
 
-    def damper_dofs(self, coefficients: Array) -> Array:
-        """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole
-        system, (..., n_dof, size).
-        """
-        out = np.zeros((*coefficients.shape[:-2], 6, coefficients.shape[-1]))
-        out[..., list(self.damper.kept), :] = coefficients[..., -self.damper.n_dof :, :]
-        return out
-
     @property
     def position(self) -> Array:
         """Contact points (n_point, 3) mm."""

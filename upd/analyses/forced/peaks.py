@@ -23,7 +23,6 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import (
     AT_TOP,
-    Fold,
     ForcedCurve,
     LinearCurves,
     PointCurve,
@@ -83,7 +82,8 @@ def solve_curve(
     if curve.empty:
         return curve
     curve = with_tops(plan, model, linear, curve)
-    curve = replace(curve, folds=tuple(folds_of(curve)))
+    folds = folds_of(curve.frequency, np.abs(curve.accelerance["right"]))
+    curve = replace(curve, folds=tuple(folds))
     return confirmed(plan, model, curve)
 
 
@@ -150,30 +150,33 @@ def climbed(
 # -- folds -----------------------------------------------------------------------------------------
 
 
-def folds_of(curve: PointCurve) -> Iterator[Fold]:
-    """Where the path turns back, with the height that a slow sweep jumps to."""
-    f, size = curve.frequency, np.abs(curve.accelerance["right"])
+def folds_of(f: Array, size: Array) -> Iterator[tuple[CurvePeak, CurvePeak]]:
+    """Where a path turns back from rising frequency, and the highest that a slow sweep up reaches
+    from where it lands then. A sweep down is one up the path from its other end, at -f.
+
+    Parameters
+    ----------
+    f, size
+        (n,) Hz and height along the path.
+    """
     up = rising(f)
     steps = np.sign(np.diff(f))
-    for i in np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 1:
-        turns_back = steps[i - 1] > 0.0
+    low, high = np.minimum(f[:-1], f[1:]), np.maximum(f[:-1], f[1:])
+    for i in np.flatnonzero((steps[:-1] > 0.0) & (steps[1:] < 0.0)) + 1:
         # a stable motion at the same frequency, on the part of the path that is reached next
-        low, high = np.minimum(f[:-1], f[1:]), np.maximum(f[:-1], f[1:])
         on = np.flatnonzero((low <= f[i]) & (f[i] <= high) & up[:-1] & up[1:])
-        on = on[on > i] if turns_back else on[on < i - 1]
+        on = on[on > i]
         if not len(on):
             continue
-        j = on[0] if turns_back else on[-1]
+        j = int(on[0])
         share = (f[i] - f[j]) / (f[j + 1] - f[j]) if f[j + 1] != f[j] else 0.0
-        landing = float(size[j] + share * (size[j + 1] - size[j]))
+        top = CurvePeak(float(f[i]), float(size[j] + share * (size[j + 1] - size[j])), j)
         # and the peak that the sweep reaches from there on
-        way = range(j + 1, len(f)) if turns_back else range(j, -1, -1)
-        at, reached = float(f[i]), landing
-        for k in takewhile(lambda k: up[k], way):
-            if size[k] < reached:
+        for k in takewhile(lambda k: up[k], range(j + 1, len(f))):
+            if size[k] < top.height:
                 break
-            at, reached = float(f[k]), float(size[k])
-        yield Fold(float(f[i]), bool(turns_back), float(size[i]), reached, at)
+            top = CurvePeak(float(f[k]), float(size[k]), k)
+        yield CurvePeak(float(f[i]), float(size[i]), int(i)), top
 
 
 # -- time integration ------------------------------------------------------------------------------

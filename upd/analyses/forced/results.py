@@ -275,17 +275,16 @@ def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
     peaks = curve.peaks.get("right", ())
     for peak in peaks:
         jumps = [
-            fold
-            for fold in curve.folds
-            if fold.up
-            and fold.before < fold.reached < (1.0 - _LOWER) * peak.height
-            and min(peaks, key=lambda one: abs(one.frequency - fold.frequency)) is peak
+            (end, top)
+            for end, top in curve.folds
+            if end.height < top.height < (1.0 - _LOWER) * peak.height
+            and min(peaks, key=lambda one: abs(one.frequency - end.frequency)) is peak
         ]
         if jumps:
-            fold = max(jumps, key=lambda one: one.reached - one.before)
+            _, top = max(jumps, key=lambda one: one[1].height - one[0].height)
             case = replace(curve.case, mode=peak.mode)
-            yield q.SWEEP_UP_FREQUENCY.of(fold.at, case, n=peak.number)
-            yield q.SWEEP_UP_ACCELERANCE.of(fold.reached, case, n=peak.number)
+            yield q.SWEEP_UP_FREQUENCY.of(top.frequency, case, n=peak.number)
+            yield q.SWEEP_UP_ACCELERANCE.of(top.height, case, n=peak.number)
 
 
 def _not_reached(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Result]:
