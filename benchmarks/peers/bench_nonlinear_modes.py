@@ -195,15 +195,16 @@ def of_rig(name: str) -> Iterator[Row]:
         for in_phase in (True, False):
             with threadpool_limits(1):
                 begin = time.process_time()
-                found = mode_over_amplitude(plan, model, linear, stiffness, in_phase)
+                case, found = mode_over_amplitude(plan, model, linear, stiffness, in_phase)
                 seconds = time.process_time() - begin
+            frequency = found["frequency"]
             yield {
                 "name": "time_mode",
-                "case": f"{name}, {found.case.mode}",
+                "case": f"{name}, {case.mode}",
                 "value": seconds,
                 "unit": "s",
                 "target": SECONDS,
-                "note": f"{len(found.frequency)} points; {found.message}",
+                "note": f"{len(frequency.data)} points; {frequency.attributes['message']}",
             }
 
 

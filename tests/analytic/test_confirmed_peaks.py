@@ -13,7 +13,7 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks
-from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top
+from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top, rising
 from upd.analyses.forced.interface_model import make_springs
 from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.measured import CurvePeak
@@ -103,7 +103,7 @@ def test_a_motion_that_is_none_leaves(slipping: ForcedSolution, factor: float) -
 def test_unstable_motions_between_folds_leave(slipping: ForcedSolution) -> None:
     (curve,) = slipping.curves
     size = np.abs(curve.accelerance["right"])
-    inside = np.flatnonzero(~curve.rising & (size > 0.5 * size.max()))
+    inside = np.flatnonzero(~rising(curve.frequency) & (size > 0.5 * size.max()))
     inside = inside[1:-1][:: max(1, len(inside) // 6)]
     assert len(inside) >= 3
     left = [stays(slipping, curve.answer.x[i], float(curve.frequency[i])) is None for i in inside]

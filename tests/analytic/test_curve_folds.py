@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, rising
+from upd.analyses.forced.curves import rising
 from upd.analyses.forced.peaks import folds_of
 from upd.hbm import FrequencyResponse, System, contacts, frequency_response
 from upd.hbm.springs.time_integration import steady_state
-
-
-def path(frequency: Any, height: Any) -> PointCurve:
-    answer: Any = SimpleNamespace(frequency=np.asarray(frequency, float))
-    return ForcedCurve("own", 1.0, 1.0, {"right": np.asarray(height, complex)}, {}, {}, answer, 0.0)
 
 
 def duffing(beta: float, n: int = 4001) -> tuple[np.ndarray, np.ndarray]:
@@ -43,18 +35,20 @@ def test_a_linear_peak_has_no_fold() -> None:
     w, A = duffing(0.0)
     assert w[A.argmax()] == pytest.approx(np.sqrt(1.0 - 2.0 * 0.02**2), rel=1e-4)
     assert rising(w).all()
-    assert not list(folds_of(path(w, A)))
+    assert not list(folds_of(w, A))
 
 
 @pytest.mark.parametrize("beta", [-0.08, 0.08])
 def test_folds_of_a_duffing_oscillator(beta: float) -> None:
     """Between them the motion is unstable; a sweep lands on the other branch."""
     w, A = duffing(beta)
-    one, other = folds_of(path(w, A))
-    assert one.up and not other.up
+    ((one, reached),) = folds_of(w, A)
+    # of a sweep down
+    ((other, lowest),) = folds_of(-w[::-1], A[::-1])
+    other, lowest = (f._replace(frequency=-f.frequency) for f in (other, lowest))
     assert other.frequency < one.frequency
     between = ~rising(w)
-    at = [int(np.argmin(np.hypot(w - f.frequency, A - f.before))) for f in (one, other)]
+    at = [one.sample, len(w) - 1 - other.sample]
     assert between[at[0] + 1 : at[1]].all()
     # the points at which it turns back belong to neither part
     assert between.sum() == at[1] - at[0] + 1
@@ -64,30 +58,35 @@ def test_folds_of_a_duffing_oscillator(beta: float) -> None:
         k = np.flatnonzero((np.minimum(w[:-1], w[1:]) <= f) & (f <= np.maximum(w[:-1], w[1:])))
         return [float(A[i] + (f - w[i]) / (w[i + 1] - w[i]) * (A[i + 1] - A[i])) for i in k]
 
-    for fold, lands in ((one, max), (other, min)) if beta < 0.0 else ((one, min), (other, max)):
-        assert fold.reached == pytest.approx(lands(others(fold.frequency)), rel=1e-3)
+    lands = (max, min) if beta < 0.0 else (min, max)
+    assert reached.height == pytest.approx(lands[0](others(one.frequency)), rel=1e-3)
+    assert lowest.height == pytest.approx(lands[1](others(other.frequency)), rel=1e-3)
     if beta < 0.0:
         # a sweep up meets the resonance behind its top
-        assert (one.at, one.before < one.reached < A.max()) == (one.frequency, True)
-        assert other.before > 0.9 * A.max()
+        assert reached.frequency == one.frequency
+        assert one.height < reached.height < A.max()
+        assert other.height > 0.9 * A.max()
     else:
-        assert one.before > 0.9 * A.max()
+        assert one.height > 0.9 * A.max()
 
 
 def test_a_sweep_that_lands_below_a_peak_goes_on_to_it() -> None:
     """Up from 4 Hz: it lands at 5.5 and climbs to 8 at 6 Hz; a later rise is another peak's."""
-    f = [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
-    height = [1.0, 1.2, 1.5, 2.0, 3.0, 3.5, 4.5, 5.5, 7.0, 8.0, 2.0, 9.0]
-    up, down = folds_of(path(f, height))
-    assert (up.frequency, up.up, up.before, up.reached, up.at) == (4.0, True, 2.0, 8.0, 6.0)
-    assert (down.frequency, down.up, down.before) == (2.0, False, 3.5)
+    f = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
+    height = np.array([1.0, 1.2, 1.5, 2.0, 3.0, 3.5, 4.5, 5.5, 7.0, 8.0, 2.0, 9.0])
+    ((end, top),) = folds_of(f, height)
+    assert (end.frequency, end.height, end.sample) == (4.0, 2.0, 3)
+    assert (top.frequency, top.height, top.sample) == (6.0, 8.0, 9)
+    ((end, top),) = folds_of(-f[::-1], height[::-1])
+    assert (end.frequency, end.height) == (-2.0, 3.5)
     # down the lower branch falls: what it lands on is what it reaches
-    assert (down.reached, down.at) == (1.2, 2.0)
+    assert (top.frequency, top.height) == (-2.0, 1.2)
 
 
 def test_where_no_other_motion_is_known_there_is_no_landing() -> None:
     """A path that ended before it came back."""
-    assert not list(folds_of(path([1.0, 2.0, 3.0, 2.5, 2.2], [1.0, 2.0, 3.0, 4.0, 5.0])))
+    f, height = np.array([1.0, 2.0, 3.0, 2.5, 2.2]), np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert not list(folds_of(f, height))
     assert rising(np.array([5.0])).tolist() == [True]
     assert rising(np.zeros(0)).tolist() == []
 
@@ -123,14 +122,12 @@ def test_a_sweep_up_jumps_at_the_fold_of_a_contact_that_opens(
     the fold says.
     """
     size = softening.amplitude([1.0])
-    curve = ForcedCurve("own", 1.0, 0.15, {"right": size.astype(complex)}, {}, {}, softening, 0.0)
-    up, down = folds_of(curve)
-    assert up.up and not down.up
-    assert up.reached > 2.5 * up.before
-    i = int(np.argmin(np.abs(curve.frequency - up.frequency)))
-    for beside, height in ((0.999, up.before), (1.001, up.reached)):
+    ((end, top),) = folds_of(softening.frequency, size)
+    assert top.height > 2.5 * end.height
+    x = softening.x[end.sample]
+    for beside, height in ((0.999, end.height), (1.001, top.height)):
         march = steady_state(
-            softening.balance, beside * up.frequency, softening.x[i], steps=512, tolerance=1e-5
+            softening.balance, beside * end.frequency, x, steps=512, tolerance=1e-5
         )
         assert march.status == "periodic"
         found = march.amplitude(np.array([1.0]))

@@ -14,7 +14,7 @@ import upd
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import checks
 from upd.analyses.forced.checks import check_solution
-from upd.analyses.forced.performance import ModeCurve, first_slip, mode_results
+from upd.analyses.forced.performance import first_slip, mode_results
 from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
 from upd.hbm import System, contacts, nonlinear_mode
@@ -44,26 +44,33 @@ def solved(centrifugal: str = "350 N") -> ForcedSolution:
     return found  # type: ignore[no-any-return]
 
 
-def modes(centrifugal: str = "350 N") -> dict[str, ModeCurve]:
-    return {one.case.mode: one for one in solved(centrifugal).nonlinear_modes}
+def curves(found: ForcedSolution) -> dict[str, dict[str, np.ndarray[Any, Any]]]:
+    return {
+        case.mode: {name: one.data for name, one in curve.items()}
+        for case, curve in found.nonlinear_modes
+    }
+
+
+def modes(centrifugal: str = "350 N") -> dict[str, dict[str, np.ndarray[Any, Any]]]:
+    return curves(solved(centrifugal))
 
 
 def test_a_mode_begins_stuck_and_its_damping_rises_with_slip() -> None:
     assert set(modes()) == {"in phase", "out of phase"}
     for one in modes().values():
-        stuck = (one.slip == 0.0) & (one.lift == 0.0)
+        stuck = (one["slip"] == 0.0) & (one["lift"] == 0.0)
         assert stuck[0] and not stuck[-1]
-        np.testing.assert_allclose(one.frequency[stuck], one.stuck, rtol=1e-6)
-        assert one.damping[stuck] == pytest.approx(one.damping[0], rel=1e-9)
-        assert one.damping.max() > 1.2 * one.damping[0]
+        np.testing.assert_allclose(one["frequency"][stuck], one["stuck_frequency"], rtol=1e-6)
+        assert one["damping"][stuck] == pytest.approx(one["damping"][0], rel=1e-9)
+        assert one["damping"].max() > 1.2 * one["damping"][0]
 
 
 def test_twice_the_centrifugal_force_is_twice_the_amplitude() -> None:
     for mode, one in modes().items():
         other = modes("700 N")[mode]
-        a, b = (c.acceleration["right"] for c in (one, other))
+        a, b = (c["acceleration_right"] for c in (one, other))
         assert b[0] / a[0] == pytest.approx(2.0, rel=1e-6)
-        zeta = [max(c.damping) for c in (one, other)]
+        zeta = [max(c["damping"]) for c in (one, other)]
         assert zeta[1] == pytest.approx(zeta[0], rel=1e-2)
 
 
@@ -71,11 +78,11 @@ def test_a_forced_peak_lies_on_its_mode() -> None:
     (curve,) = solved("350 N").curves
     for peak in curve.peaks["right"]:
         one = modes()[peak.mode]
-        a = one.acceleration["right"]
+        a = one["acceleration_right"]
         # where the amplitude first comes to that of the peak
         k = int(np.argmax(a >= peak.height * curve.force))
         frequency = np.interp(
-            peak.height * curve.force, a[k - 1 : k + 1], one.frequency[k - 1 : k + 1]
+            peak.height * curve.force, a[k - 1 : k + 1], one["frequency"][k - 1 : k + 1]
         )
         assert peak.frequency == pytest.approx(frequency, rel=1e-3)
 
@@ -93,11 +100,11 @@ def test_first_slip_by_hand() -> None:
 
 
 def test_numbers_name_the_largest_damping_unless_it_still_rises() -> None:
-    for one in modes().values():
-        numbers = {r.name: r for r in mode_results(one)}
+    for case, curve in solved("350 N").nonlinear_modes:
+        one, numbers = modes()[case.mode], {r.name: r for r in mode_results(case, curve)}
         largest = numbers["largest_damping"]
-        assert largest.value == pytest.approx(100 * one.damping.max(), rel=2e-2)
-        rises = one.damping.argmax() == one.acceleration["right"].argmax()
+        assert largest.value == pytest.approx(100 * one["damping"].max(), rel=2e-2)
+        rises = one["damping"].argmax() == one["acceleration_right"].argmax()
         assert rises == ("force_for_damping" not in numbers)
         if not rises:
             at = numbers["damping_acceleration"].value
@@ -108,9 +115,9 @@ def test_sweeps_have_their_modes_too() -> None:
     scene = RIG | {"balance.method": "march", "excitation.points": 10}
     plan = make_plan(load_scene("asymmetric-response", scene))
     found: Any = forced.ANALYSIS.solve(plan, Stages(silent))
-    assert [one.case.mode for one in found.nonlinear_modes] == ["in phase", "out of phase"]
-    for one in found.nonlinear_modes:
-        np.testing.assert_allclose(one.damping, modes()[one.case.mode].damping, rtol=1e-9)
+    assert list(curves(found)) == ["in phase", "out of phase"]
+    for mode, one in curves(found).items():
+        np.testing.assert_allclose(one["damping"], modes()[mode]["damping"], rtol=1e-9)
 
 
 def test_without_friction_there_is_nothing_to_damp() -> None:

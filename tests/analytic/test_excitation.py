@@ -174,7 +174,7 @@ def test_the_march_settles_where_another_does_in_either_harmonic() -> None:
         model = excited(*(replace(one, harmonic=k) for one in forces))
         f = NEAR / k
         found = answer(model, np.array([f]), SLIPPING, harmonics=range(0, 3 * k + 1, k))
-        springs = spring_march(model, 0.005, model.n, 4)
+        springs = spring_march(model, 0.005, len(model.K), 4)
         drive = SLIPPING * model.excitation.drive
         march = InterfaceMarch(springs.march, f, drive, 128 * k, by_coulomb)
         at = state_of(springs, model, found, 0, SLIPPING)
@@ -196,7 +196,7 @@ def test_the_state_of_a_motion_repeats_it_with_forces_at_both_places() -> None:
     forces = (ONE, replace(OTHER, phase=70.0), replace(OTHER, amplitude=0.3, harmonic=2))
     model = excited(*forces)
     found = answer(model, F[1:2])
-    springs = spring_march(model, 0.005, model.n, 4)
+    springs = spring_march(model, 0.005, len(model.K), 4)
     march = InterfaceMarch(springs.march, F[1], STUCK * model.excitation.drive, 128)
     at = state_of(springs, model, found, 0, STUCK)
     begun = at.copy()

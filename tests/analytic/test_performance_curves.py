@@ -21,7 +21,6 @@ from upd.analyses.forced.performance import (
     of_curve,
     peaks_at,
     performance_of,
-    ratios_of,
 )
 from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.measured import CurvePeak
@@ -191,13 +190,6 @@ def test_the_curve_has_the_runs_own_points_once() -> None:
     assert len(performance_of(linear, points[:2], [early]).points) == 3
     assert found.stuck == max(p.height for s in linear.stuck_peaks.values() for p in s)
     assert math.isnan(found.free), "no free peak between 400 and 460 Hz"
-
-
-def test_ratios_are_the_scenes() -> None:
-    plan = solved(1e5).plan
-    choice = replace(plan.scene.performance, lowest=2.0, highest=200.0, points=3)
-    scene = replace(plan, scene=replace(plan.scene, performance=choice))
-    assert ratios_of(scene) == pytest.approx([2.0, 20.0, 200.0])
 
 
 def test_a_run_finds_the_best_ratio_and_tells_it() -> None:

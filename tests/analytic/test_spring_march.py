@@ -15,6 +15,7 @@ from upd.analyses import forced, make_plan
 from upd.analyses.forced.curves import both_ways, stuck_modes_of
 from upd.analyses.forced.interface_model import by_coulomb, make_springs, spring_march
 from upd.analyses.forced.measures import path_maxima
+from upd.analyses.forced.peaks import folds_of
 from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch
@@ -52,7 +53,7 @@ def solution() -> ForcedSolution:
 
 def test_the_stuck_march_is_the_stuck_blades(solution: ForcedSolution) -> None:
     model = solution.models["thesis"]
-    springs = spring_march(model, 0.005, model.n, 4)
+    springs = spring_march(model, 0.005, len(model.K), 4)
     f = np.linspace(300.0, 500.0, 41)
     found = springs.march.linear_response(f, [1.0], stuck=True)[:, :2]
     moved = stuck_motion(model, f)
@@ -136,7 +137,9 @@ def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution, swept: Forc
     assert (np.abs(fold - tops[1].frequency) < 1.1).any()
     # the balance tells where, and a sweep of 1 Hz steps stops short of it
     (curve,) = solution.curves
-    assert min(abs(f.frequency - fold[0]) for f in curve.folds if not f.up) < 1.1
+    size = np.abs(curve.accelerance["right"])
+    ends = [end.frequency for end, _ in folds_of(-curve.frequency[::-1], size[::-1])]
+    assert min(abs(-f - fold[0]) for f in ends) < 1.1
 
 
 def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> None:

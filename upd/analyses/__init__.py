@@ -33,15 +33,15 @@ _MODULES = {"hertz": "contact.analysis", "flat": "contact.analysis"}
 
 def analysis_of(scene: AnyScene) -> Analysis:
     """The analysis that the scene names, or its recipe declares."""
-    return _analysis(_NAMES[scene.analysis])
+    found = analysis_named(_NAMES[scene.analysis])
+    assert found is not None
+    return found
 
 
 def analysis_named(name: str) -> Analysis | None:
     """The analysis of a run folder, by the name that the folder has of it; None for another."""
-    return _analysis(name) if name in _NAMES.values() else None
-
-
-def _analysis(name: str) -> Analysis:
+    if name not in _NAMES.values():
+        return None
     module = import_module(f"upd.analyses.{_MODULES.get(name, name)}")
     found: Analysis = module.ANALYSIS if hasattr(module, "ANALYSIS") else module.ANALYSES[name]
     return found

@@ -161,20 +161,16 @@ def first_numbers(results: Sequence[Entry], names: Sequence[str]) -> list[Entry]
     for entry in sorted(results, key=lambda entry: not entry["value"]):
         first.setdefault(entry["name"], entry)
     found = [name for one in names for name in [n for n in first if fnmatchcase(n, one)][:_FEW]]
-    rank = {name: k for k, name in enumerate(found)}
+    rank, both = {name: k for k, name in enumerate(found)}, {"side": ""}
     mine = [
         entry
         for entry in results
-        if entry["name"] in rank and _any_side(entry) == _any_side(first[entry["name"]])
+        if entry["name"] in rank
+        and entry["case_fields"] | both == first[entry["name"]]["case_fields"] | both
     ]
     order = list(dict.fromkeys(entry["case"] for entry in mine))
     least = {case: min(rank[e["name"]] for e in mine if e["case"] == case) for case in order}
     return sorted(mine, key=lambda e: (least[e["case"]], order.index(e["case"]), rank[e["name"]]))
-
-
-def _any_side(entry: Entry) -> dict[str, Any]:
-    """What both faces share of a number's case."""
-    return {key: value for key, value in entry["case_fields"].items() if key != "side"}
 
 
 S = TypeVar("S", bound=AnyScene)

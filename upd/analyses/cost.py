@@ -105,14 +105,15 @@ class CostModel:
         self.solver[task] = f"{choice.name}: {choice.why}"
         return choice.cost
 
-    def condensed(self, task: str, count: Count, n_kept: int) -> None:
-        """A body condensed onto its contact dofs."""
-        self._condensed(task, count, n_kept, self.choice(task, count, n_kept))
+    def condensed(
+        self, task: str, count: Count, n_kept: int, found: Prediction | None = None
+    ) -> None:
+        """A body condensed onto its contact dofs, by a solver chosen before or by the best.
 
-    def _condensed(self, task: str, count: Count, n_kept: int, found: Prediction) -> None:
-        """The next job lets its factor go: K of the free dofs and what is dense stay. Multigrid and
+        The next job lets its factor go: K of the free dofs and what is dense stay. Multigrid and
         what is learned from products keep their solver.
         """
+        found = found or self.choice(task, count, n_kept)
         self.shared += found.seconds
         if not self.solver[task].startswith(("amg", select.PRODUCTS)):
             dense = select.DENSE * float(n_kept) ** 2
@@ -135,7 +136,7 @@ class CostModel:
         rest = room - self._entries(count) * _COPIES
         choice = choose_route(ways, products, route=asked.route, memory_limit_bytes=rest)
         self.solver[task] = f"{choice.name}: {choice.why}"
-        self._condensed(task, count, n_kept, choice.cost)
+        self.condensed(task, count, n_kept, choice.cost)
 
     def held_in_mean(self, task: str, count: Count) -> None:
         """What a body that was condensed takes more where a weighted set holds it: another factor,

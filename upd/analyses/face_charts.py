@@ -4,7 +4,6 @@ neither analysis imports the other. Lengths in mm.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -28,19 +27,14 @@ def values(group: Group, name: str, scale: float = 1.0) -> Array:
     return np.asarray(group[name].data, float) * scale
 
 
-def _frames(groups: Iterable[Group]) -> tuple[Trace, ...]:
-    """Edges of the faces."""
-    out = []
+def face_chart(title: str, groups: list[Group], case: str, figure: str, **more: Any) -> Chart:
+    """A chart of faces with their edges, lengths in mm alike; ``more`` are fields of it."""
+    edges = []
     for group in groups:
         (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
         x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-        out.append(Trace("", x, y, outline=True))
-    return tuple(out)
-
-
-def face_chart(title: str, groups: list[Group], case: str, figure: str, **more: Any) -> Chart:
-    """A chart of faces with their edges, lengths in mm alike; ``more`` are fields of it."""
-    more = FACE | {"traces": _frames(groups)} | more
+        edges.append(Trace("", x, y, outline=True))
+    more = FACE | {"traces": tuple(edges)} | more
     return Chart(title, case=case, figure=figure, equal=True, **more)
 
 

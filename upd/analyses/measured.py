@@ -95,15 +95,17 @@ def measured_results(
     results: list[Result] = []
     for name, choice in measured.items():
         curve = choice.read()
+        criterion = q.FRAC if curve.is_complex else q.MAGNITUDE_CORRELATION
         found = list(computed(choice))
         if not found:
             reason = missing(choice)
             case = _case(name, choice)
-            asked = (q.COMPUTED_FREQUENCY, _criterion(curve))
+            asked = (q.COMPUTED_FREQUENCY, criterion)
             results += [quantity.withheld(case, reason) for quantity in asked]
         peaks = noisy_peaks(curve.frequency, curve.magnitude)
         for one in found:
-            results += _correlation(name, curve, one) + _differences(name, curve, peaks, one)
+            results.append(_correlation(criterion, name, curve, one))
+            results += _differences(name, curve, peaks, one)
         if choice.state == FREE:
             results += _damping(damping, name, choice, peaks, found)
     return results
@@ -118,16 +120,12 @@ def _case(name: str, choice: MeasuredChoice) -> Case:
     )
 
 
-def _criterion(curve: MeasuredCurve) -> Quantity:
-    return q.FRAC if curve.is_complex else q.MAGNITUDE_CORRELATION
-
-
-def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]:
+def _correlation(what: Quantity, name: str, curve: MeasuredCurve, one: Computed) -> Result:
     """FRAC over the common band, or the correlation of magnitudes, at the measured frequencies."""
-    case, what = replace(one.case, name=name), _criterion(curve)
+    case = replace(one.case, name=name)
     on = (curve.frequency >= one.band[0]) & (curve.frequency <= one.band[1])
     if on.sum() < LEAST_POINTS:
-        return [what.withheld(case, _apart(curve, one))]
+        return what.withheld(case, _apart(curve, one))
     H, mine = one.at(curve.frequency[on]), curve.accelerance[on]
     lost = int(np.isnan(H).sum())
     if lost:
@@ -135,11 +133,11 @@ def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]
             f"the computed path turns back and has several motions at {lost} of {len(H)} measured "
             "frequencies"
         )
-        return [what.withheld(case, reason)]
+        return what.withheld(case, reason)
     try:
-        return [what.of(frac(mine, H if curve.is_complex else np.abs(H)), case)]
+        return what.of(frac(mine, H if curve.is_complex else np.abs(H)), case)
     except InputError as error:
-        return [what.withheld(case, str(error))]
+        return what.withheld(case, str(error))
 
 
 def _apart(curve: MeasuredCurve, one: Computed) -> str:
@@ -197,22 +195,20 @@ def _damping(
         fit = fit_of(choice)
     except InputError as error:
         return [*results, q.FITTED_DAMPING.withheld(case, str(error))]
+    # what the noise leaves of a fitted number
+    basis = "95 % interval of the fit: 1.96 standard errors"
     for k in range(len(fit.zeta)):
         at = replace(case, peak=k + 1)
-        zeta, f = float(fit.zeta[k]), float(fit.frequency[k])
-        results += [
-            _within(q.FITTED_DAMPING.of(zeta, at), fit.zeta_error[k] / zeta),
-            _within(q.FITTED_FREQUENCY.of(f, at), fit.frequency_error[k] / f),
-        ]
+        for quantity, values, errors in (
+            (q.FITTED_DAMPING, fit.zeta, fit.zeta_error),
+            (q.FITTED_FREQUENCY, fit.frequency, fit.frequency_error),
+        ):
+            value = float(values[k])
+            bound = float(ndtri(0.975) * (errors[k] / value))
+            part = ErrorPart("measurement noise", bound, basis)
+            results.append(with_parts(quantity.of(value, at), [part]))
     noise = q.FITTED_NOISE.of(fit.noise.relative, case)
     return [*results, noise, q.NOISE_CONSTANT.of(fit.noise.constant, case)]
-
-
-def _within(result: Result, standard_error: float) -> Result:
-    """A fitted number with what the noise leaves of it, by its relative standard error."""
-    basis = "95 % interval of the fit: 1.96 standard errors"
-    bound = float(ndtri(0.975) * standard_error)
-    return with_parts(result, [ErrorPart("measurement noise", bound, basis)])
 
 
 def _half_power(
@@ -315,17 +311,12 @@ def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> t
         colour = colours.get(case.kind if case.force_ratio is None else case.force_ratio)
         if colour is None:
             colour, spare = spare, spare + 1
-        out.append(_points(group, blade, colour))
+        f, H = frequency_of(group), magnitude(group[f"accelerance_{blade}"])
+        words = Case(kind=case.kind, force_ratio=case.force_ratio).label
+        on = np.unique([*range(0, len(f), 1 + (len(f) - 1) // _DRAWN), int(H.argmax())])
+        some = f", {len(on)} of {len(f)} points" if len(on) < len(f) else ""
+        out.append(Trace(f"measured, {words}{some}", f[on], H[on], "open points", colour))
         if "fitted" in group:
-            f, H = frequency_of(group), magnitude(group["fitted"])
+            H = magnitude(group["fitted"])
             out.append(Trace(f"modes fitted to {case.name}", f, H, "dotted", colour))
     return tuple(out)
-
-
-def _points(group: Group, blade: str, colour: int) -> Trace:
-    f, H = frequency_of(group), magnitude(group[f"accelerance_{blade}"])
-    case = case_of(group)
-    words = Case(kind=case.kind, force_ratio=case.force_ratio).label
-    on = np.unique([*range(0, len(f), 1 + (len(f) - 1) // _DRAWN), int(H.argmax())])
-    some = f", {len(on)} of {len(f)} points" if len(on) < len(f) else ""
-    return Trace(f"measured, {words}{some}", f[on], H[on], "open points", colour)

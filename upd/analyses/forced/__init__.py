@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from upd.analyses.base import Analysis, rig_needs
@@ -16,14 +17,12 @@ from upd.linalg.parallel import threads_for
 from upd.vary.inputs import coarsened_rig
 
 
-def _on_one_thread(make: Callable[[ForcedSolution], Any]) -> Callable[[ForcedSolution], Any]:
+def _on_one_thread(make: Callable[[ForcedSolution], Any], solution: ForcedSolution) -> Any:
     """Read a solution with small matrices on one thread, where more would wait for each other."""
-
-    def made(solution: ForcedSolution) -> Any:
-        with threads_for(solution.order):
-            return make(solution)
-
-    return made
+    orders = [len(one.M) for one in solution.models.values()]
+    orders += [3 * one.of.n for one in solution.faces.values()]
+    with threads_for(max(orders, default=0)):
+        return make(solution)
 
 
 def _sizes(solution: ForcedSolution) -> dict[str, int]:
@@ -35,10 +34,10 @@ def _sizes(solution: ForcedSolution) -> dict[str, int]:
 ANALYSIS = Analysis(
     name="forced",
     headline_names=answer.MAIN,
-    problem=replace(varied.PROBLEM, make_results=_on_one_thread(results.make_results)),
+    problem=replace(varied.PROBLEM, make_results=partial(_on_one_thread, results.make_results)),
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
-    check_solution=_on_one_thread(checks.check_solution),
-    arrays=_on_one_thread(results.arrays),
+    check_solution=partial(_on_one_thread, checks.check_solution),
+    arrays=partial(_on_one_thread, results.arrays),
     sizes=_sizes,
     charts=answer.charts,
     headline=answer.headline,

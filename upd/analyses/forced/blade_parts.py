@@ -47,7 +47,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.seated.bodies import Blade, Bodies, is_half, lattice, patch_frame
+from upd.analyses.seated.bodies import Bodies, is_half, lattice, patch_frame
 from upd.errors import InputError
 from upd.fem.surface import face_moments
 from upd.linalg.parallel import in_parallel
@@ -360,18 +360,18 @@ def reduced_blades(
     plan: ForcedPlan, bodies: Bodies
 ) -> tuple[Mapping[Side, FacePoints], list[BladePart]]:
     """Points of both faces, each blade on what its points and probes see."""
-    faces = {side: _face(plan.scene, bodies, side) for side in SIDES}
+    faces, contact = dict[Side, FacePoints](), plan.scene.contact
+    for side in SIDES:
+        mesh, (rows, columns) = bodies.blades[side].mesh, contact.lines(side)
+        faces[side] = (
+            gauss_points(mesh, rows, columns, side)
+            if contact.rule == GAUSS
+            else lattice_points(mesh, rows, columns, side, contact.share == "equal")
+        )
     parts = in_parallel(
         [partial(_reduced, plan.scene, bodies, side, faces[side]) for side in SIDES], plan.workers
     )
     return faces, parts
-
-
-def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
-    mesh, (rows, columns) = bodies.blades[side].mesh, scene.contact.lines(side)
-    if scene.contact.rule == GAUSS:
-        return gauss_points(mesh, rows, columns, side)
-    return lattice_points(mesh, rows, columns, side, scene.contact.share == "equal")
 
 
 def _reduced(scene: ForcedScene, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
@@ -442,25 +442,18 @@ def _attached(scene: ForcedScene, bodies: Bodies, side: Side, names: tuple[str, 
     )
     many = gauss_points(blade.mesh, key[1], columns, side)
     if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
-        loads = _loads(blade, many, names)
+        # displacements of the points in the face's frame, then of the probes, by the free dofs
+        whole = np.zeros((many.n_point, 3, blade.mesh.n_node, 3))
+        whole[:, :, many.nodes] = np.einsum("mk,fc->mfkc", many.values, many.frame)
+        probes = np.zeros((len(names), len(blade.free)))
+        probes[range(len(names)), [blade.probe(name) for name in names]] = 1.0
+        loads = np.vstack([whole.reshape(3 * many.n_point, -1)[:, blade.free], probes])
         found = attachment_modes(blade.K, blade.M, loads, most, solver=scene.solver.name)
         bodies.attached[key] = found
     known = bodies.attached[key]
     seen, probes = np.split(known.rows, [3 * many.n_point])
     seen = np.einsum("mn,ncr->mcr", fewer_rows(many, rows), seen.reshape(many.n_point, 3, -1))
     return BladePart(known.K, known.M, seen, probes, most)
-
-
-def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> FloatArray:
-    """(3 m + n_probe, n_free) displacements of the points in the face's frame, then of the probes,
-    of the blade's free dofs.
-    """
-    whole = np.zeros((face.n_point, 3, blade.mesh.n_node, 3))
-    whole[:, :, face.nodes] = np.einsum("mk,fc->mfkc", face.values, face.frame)
-    out = np.zeros((3 * face.n_point + len(names), len(blade.free)))
-    out[: 3 * face.n_point] = whole.reshape(3 * face.n_point, -1)[:, blade.free]
-    out[range(3 * face.n_point, len(out)), [blade.probe(name) for name in names]] = 1.0
-    return out
 
 
 def ritz(model: BladePart) -> BladePart:
@@ -485,10 +478,5 @@ def ritz(model: BladePart) -> BladePart:
     keep = values > len(values) * np.finfo(float).eps ** 0.75 * values[-1]
     rest = static @ (V[:, keep] / np.sqrt(values[keep]))
     T = np.hstack([modes, rest - modes @ (modes.T @ model.M @ rest)])
-    K, M = (symmetric(T.T @ A @ T) for A in (model.K, model.M))
+    K, M = (0.5 * (A + A.T) for A in (T.T @ model.K @ T, T.T @ model.M @ T))
     return BladePart(K, M, rows @ T, probes @ T, model.n_modes)
-
-
-def symmetric(A: FloatArray) -> FloatArray:
-    """Its symmetric part."""
-    return np.asarray(0.5 * (A + A.T))

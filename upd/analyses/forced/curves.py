@@ -134,28 +134,6 @@ class TimeCheck:
         return abs(self.integrated / self.balance - 1.0) if self.stays else float("inf")
 
 
-class Fold(NamedTuple):
-    """Where a slow sweep jumps: the end of a branch, and the highest it reaches after the jump.
-
-    Attributes
-    ----------
-    frequency
-        Hz.
-    up
-        Whether the frequency rises.
-    before, reached
-        Heights of the right blade at the end of the branch and after the jump, (m/s2)/N.
-    at
-        Hz, where that is.
-    """
-
-    frequency: float
-    up: bool
-    before: float
-    reached: float
-    at: float
-
-
 #: harmonic balance of points or of whole faces, or a sweep
 Answer = TypeVar("Answer", FrequencyResponse, InterfaceResponse, SteppedSine)
 #: ways along which a curve is swept; "" by harmonic balance
@@ -191,7 +169,8 @@ class ForcedCurve(Generic[Answer]):
     checked
         Peaks on which a point slips or opens, by time integration.
     folds
-        Along the path.
+        Where a slow sweep up jumps: the end of a branch of the right blade, and the highest that it
+        reaches after the jump.
     periods
         Number of a peak of the right blade -> the last period there, of a sweep.
     """
@@ -207,7 +186,7 @@ class ForcedCurve(Generic[Answer]):
     way: Way = ""
     tops: Mapping[tuple[Side, int], Top] = field(default_factory=dict)
     checked: tuple[TimeCheck, ...] = ()
-    folds: tuple[Fold, ...] = ()
+    folds: tuple[tuple[CurvePeak, CurvePeak], ...] = ()
     periods: Mapping[int, RecordedPeriod] = field(default_factory=dict)
 
     @property
@@ -243,13 +222,6 @@ class ForcedCurve(Generic[Answer]):
         mine = (c for c in self.checked if (c.blade, c.number) == (side, number))
         return next((c for c in mine if c.stays and not c.at_top), None)
 
-    @property
-    def rising(self) -> NDArray[np.bool_]:
-        """(n,) whether the frequency rises along the path: between two folds, where it falls, the
-        motion is unstable.
-        """
-        return rising(self.frequency)
-
 
 #: a curve of contact points, and of whole faces, by harmonic balance; a sweep
 PointCurve = ForcedCurve[FrequencyResponse]
@@ -258,7 +230,8 @@ SweptCurve = ForcedCurve[SteppedSine]
 
 
 def rising(frequency: Array) -> NDArray[np.bool_]:
-    """(n,) whether the frequency rises along a path.
+    """(n,) whether the frequency rises along a path: between two folds, where it falls, the motion
+    is unstable.
 
     The sign of the step is that of the Jacobian's determinant, which changes at a fold.
 
@@ -341,17 +314,6 @@ def finer(frequency: Array, modes: Array, width: Array) -> Array:
     return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
 
 
-def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:
-    # flat at the top: to half of the digits of f, of the height lacks (eps^1/2 f / width)^2
-    found = minimize_scalar(
-        lambda f: -float(abs(response(np.array([f]))[0])),
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": float(np.sqrt(np.finfo(float).eps)) * high},
-    )
-    return float(found.x), -float(found.fun)
-
-
 class Limit(NamedTuple):
     """A linear limit as a function of frequency: no contacts, or all of them closed and sticking.
 
@@ -397,12 +359,21 @@ class Limit(NamedTuple):
         f = around_modes(self.modes, self.width, float(grid[0]), float(grid[-1]))
         a = np.abs(response(f))
         tops = np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
-        every = [_top(response, f[i - 1], f[i + 1]) for i in tops]
-        highest = max([float(a.max(initial=0.0)), *(top for _, top in every)])
+        # flat at the top: to half of the digits of f, of the height lacks (eps^1/2 f / width)^2
+        every = [
+            minimize_scalar(
+                lambda at: -float(abs(response(np.array([at]))[0])),
+                bounds=(f[i - 1], f[i + 1]),
+                method="bounded",
+                options={"xatol": float(np.sqrt(np.finfo(float).eps)) * f[i + 1]},
+            )
+            for i in tops
+        ]
+        highest = max([float(a.max(initial=0.0)), *(-float(one.fun) for one in every)])
         peaks = [
-            CurvePeak(at, top, int(np.abs(grid - at).argmin()))
-            for at, top in every
-            if top >= measures.PEAKS_ABOVE * highest
+            CurvePeak(float(one.x), -float(one.fun), int(np.abs(grid - one.x).argmin()))
+            for one in every
+            if -one.fun >= measures.PEAKS_ABOVE * highest
         ]
         found = sorted(sorted(peaks, key=lambda one: -one.height)[:2])
         if self.shapes is None or not found:

@@ -23,7 +23,7 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
 from upd.analyses.forced.curves import Top, stuck_frequency
 from upd.analyses.forced.measures import StuckMode, mode_shapes
-from upd.analyses.forced.model import Array, Model, balance_of, preloaded
+from upd.analyses.forced.model import Model, balance_of, preloaded
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.measured import CurvePeak
 from upd.analyses.seated.bodies import Bodies
@@ -176,20 +176,21 @@ def nearer(model: Model, factor: float) -> Model | None:
         up, columns = local - face.weight @ local, face.line[:, 1]
         mine = np.zeros((len(on), len(on)))
         for column in np.unique(columns):
-            rows = np.flatnonzero(columns == column)
-            rows = rows[np.argsort(up[rows])]
-            if len(rows) < 2:
+            line = np.flatnonzero(columns == column)
+            line = line[np.argsort(up[line])]
+            if len(line) < 2:
                 return None
-            for row, one in zip(rows, np.eye(len(rows)), strict=True):
-                mine[rows, row] = np.interp(factor * up[rows], up[rows], one)
+            for point, one in zip(line, np.eye(len(line)), strict=True):
+                mine[line, point] = np.interp(factor * up[line], up[line], one)
         at[np.ix_(on, on)] = mine
         faces[side] = replace(face, position=mine @ face.position, values=mine @ face.values)
 
-    def rows_of(of: Array) -> Array:
-        return np.ascontiguousarray(np.einsum("gp,pdn->gdn", at, of))
-
-    contacts = replace(model.contacts, rows=rows_of(model.contacts.rows))
-    return replace(model, contacts=contacts, damper_rows=rows_of(model.damper_rows), faces=faces)
+    rows, on_damper = (
+        np.ascontiguousarray(np.einsum("gp,pdn->gdn", at, of))
+        for of in (model.contacts.rows, model.damper_rows)
+    )
+    contacts = replace(model.contacts, rows=rows)
+    return replace(model, contacts=contacts, damper_rows=on_damper, faces=faces)
 
 
 # -- an effect left out ----------------------------------------------------------------------------
@@ -261,22 +262,6 @@ def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckM
     .. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5 (inertia
            relief).
     """
-    _, _, K, B = model.linear(stuck=False)
-    k = stuck_stiffness(model.contacts).ravel()
-    G = elastic_compliance(plan, bodies, model)
-    # (k^-1 + G)^-1, also where k = 0
-    joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
-    return mode_shapes(model, 2.0 * plan.scene.excitation.stop, K + B.T @ joint @ B).modes
-
-
-def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
-    """Elastic compliance of the free damper at its contact rows, mm/N.
-
-    Returns
-    -------
-    Array
-        (n, n), n = n_point (1 + tangents), point by point; symmetric, positive semidefinite.
-    """
     faces = [model.faces[side] for side in SIDES]
     G = damper_compliance(plan, bodies, [face.nodes for face in faces])[0]
     # shares of the nodes in the motion of the points along their frames
@@ -286,7 +271,10 @@ def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
     n = len(G) // 3
     G = np.einsum("fmn,fngk,gpk->mfpg", at, G.reshape(3, n, 3, n), at, optimize=True)
     components = [0, 1, 2] if model.contacts.tangents == 2 else [0, 2]
-    rows = len(at[0]) * len(components)
-    # a half has half of the forces
-    part = 0.5 if bodies.half else 1.0
-    return np.asarray(part * G[:, components][..., components].reshape(rows, rows))
+    _, _, K, B = model.linear(stuck=False)
+    k = stuck_stiffness(model.contacts).ravel()
+    # at the contact rows, point by point; a half has half of the forces
+    G = (0.5 if bodies.half else 1.0) * G[:, components][..., components].reshape(len(k), len(k))
+    # (k^-1 + G)^-1, also where k = 0
+    joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
+    return mode_shapes(model, 2.0 * plan.scene.excitation.stop, K + B.T @ joint @ B).modes

@@ -78,17 +78,14 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
         # every mode is of one blade, those of the left one first
         on = np.repeat(np.eye(len(SIDES)), len(made.frequency) // len(SIDES), axis=0)
         made = replace(made, damping=scene.modal_damping(made.frequency, on))
-    with stages("static state", f"{_name(scene.contact.static)}, {of.n} nodes"):
+    name = scene.contact.static if isinstance(scene.contact.static, str) else GIVEN
+    with stages("static state", f"{name}, {of.n} nodes"):
         march, start = _begin(plan, bodies, made, of)
     forces = of.copies * np.stack(
         [start.f.reshape(3, -1)[:, of.face == k].sum(axis=1) for k in range(len(SIDES))]
     )
-    state = StaticState(_name(scene.contact.static), forces[:, 0], forces[:, 2])
+    state = StaticState(name, forces[:, 0], forces[:, 2])
     return WholeFaces(of, march, start, state)
-
-
-def _name(static: Any) -> str:
-    return static if isinstance(static, str) else GIVEN
 
 
 def _begin(
@@ -116,7 +113,7 @@ def _begin(
         return model, resting(model, last.force, slip, last.gap, last.motion)
     if worn < 1.0:
         raise InputError(
-            f"contact.static: {_name(static)!r} is a state of faces worn in; to fix it: "
+            f"contact.static: {static!r} is a state of faces worn in; to fix it: "
             'contact.fit = "worn", or contact.static = "seated" or "frictionless"'
         )
     return worn_start(model, of, F, static_state(plan, bodies).ratio)
@@ -465,7 +462,7 @@ def state_at(
     moved = mean + z.real.sum(axis=1)
     speed = (1j * omega * k * z).real.sum(axis=1)
     pull = (-((omega * k) ** 2) * z).real.sum(axis=1)
-    n_blade = model.n
+    n_blade = len(model.K)
     q = springs.modes @ moved[:n_blade]
     q += (march.shapes.T @ springs.rest.T.ravel()) / march.omega**2
     carried = np.zeros((march.n, 3))

@@ -225,8 +225,9 @@ def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array
     static, amplitude
         (n, 6) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
     """
-    q = model.damper_dofs(answer.coefficients)
-    h = answer.harmonics
+    h, found = answer.harmonics, answer.coefficients
+    q = np.zeros((len(found), 6, h.size))
+    q[:, list(model.damper.kept)] = found[:, -model.damper.n_dof :]
     first = h.offset + 2 * h.place(model.excitation.lowest)
     static = q[:, :, 0] if h.static else np.zeros(q.shape[:2])
     return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])

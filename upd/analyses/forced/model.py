@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 
-from upd.analyses.forced.blade_parts import FacePoints, reduced_blades, symmetric
+from upd.analyses.forced.blade_parts import FacePoints, reduced_blades
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.seated.bodies import Bodies
@@ -94,36 +94,23 @@ class Model:
     state: StaticState | None = None
 
     @property
-    def n(self) -> int:
-        """Dofs of both reduced blades."""
-        return len(self.K)
-
-    @property
     def force(self) -> ComplexArray:
         """(n,) the lowest harmonic that is excited, per newton of F_E."""
         return np.asarray(self.places @ self.excitation.read)
-
-    def harmonic_force(self, force: float) -> dict[int, ComplexArray]:
-        """(n,) N of every harmonic that is excited, with F_E = ``force``."""
-        drive = force * self.excitation.drive
-        return {k: self.places @ drive[:, k - 1] for k in self.excitation.harmonics}
 
     def row(self, side: Side) -> Array:
         """Output row (n + damper.n_dof,) with the damper's dofs."""
         return np.concatenate([self.output[side], np.zeros(self.damper.n_dof)])
 
     @property
-    def slider(self) -> Array | None:
-        """(n_point, d) mm, where the sliders carry the static traction; None without friction."""
-        law = self.contacts.law
-        return -self.traction / law.k_t[:, None] if np.any(law.mu) else None
-
-    @property
     def system(self) -> System:
-        """What `upd.hbm` takes of it, the excitation and the balance aside."""
-        own = ("contacts", "damper", "damper_rows", "slider")
-        given = {name: getattr(self, name) for name in own}
-        return System((self.M, self.C, self.K), static_force=self.static, **given)
+        """What `upd.hbm` takes of it, the excitation and the balance aside; with friction the
+        sliders stand where they carry the static traction.
+        """
+        law = self.contacts.law
+        slider = -self.traction / law.k_t[:, None] if np.any(law.mu) else None
+        own = {name: getattr(self, name) for name in ("contacts", "damper", "damper_rows")}
+        return System((self.M, self.C, self.K), static_force=self.static, slider=slider, **own)
 
     def linear(self, stuck: bool) -> tuple[Array, Array, Array, Array]:
         """M, C, K (n, n) of blades and damper and rows B of the points, without contacts or with
@@ -135,14 +122,6 @@ class Model:
         if stuck:
             K = K + points.B.T @ (stuck_stiffness(points).ravel()[:, None] * points.B)
         return M, C, K, points.B
-
-    def damper_dofs(self, coefficients: Array) -> Array:
-        """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole
-        system, (..., n_dof, size).
-        """
-        out = np.zeros((*coefficients.shape[:-2], 6, coefficients.shape[-1]))
-        out[..., list(self.damper.kept), :] = coefficients[..., -self.damper.n_dof :, :]
-        return out
 
     @property
     def position(self) -> Array:
@@ -221,7 +200,7 @@ def _rigid(scene: ForcedScene, bodies: Bodies) -> RigidDamper:
     own = bodies.damper.with_mirror_image(_AXIS_Y) if bodies.half else bodies.damper
     return rigid_damper(
         own.mass,
-        symmetric(own.inertia),
+        0.5 * (own.inertia + own.inertia.T),
         own.centre,
         [0.0, 0.0, scene.damper.centrifugal],
         kept=_EVEN_DOFS if bodies.half else range(6),
@@ -349,7 +328,9 @@ def balance_of(
         samples=samples or (None if b.samples == "auto" else b.samples),
         start=start or b.slider,
     )
-    return given.balance("balance", np.ones(1), model.harmonic_force(force), fast_exits=True)
+    drive = force * model.excitation.drive
+    forces = {k: model.places @ drive[:, k - 1] for k in model.excitation.harmonics}
+    return given.balance("balance", np.ones(1), forces, fast_exits=True)
 
 
 @contextmanager

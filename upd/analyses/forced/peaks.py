@@ -23,7 +23,6 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import (
     AT_TOP,
-    Fold,
     ForcedCurve,
     LinearCurves,
     PointCurve,
@@ -83,7 +82,8 @@ def solve_curve(
     if curve.empty:
         return curve
     curve = with_tops(plan, model, linear, curve)
-    curve = replace(curve, folds=tuple(folds_of(curve)))
+    folds = folds_of(curve.frequency, np.abs(curve.accelerance["right"]))
+    curve = replace(curve, folds=tuple(folds))
     return confirmed(plan, model, curve)
 
 
@@ -94,29 +94,25 @@ def with_tops(
     plan: ForcedPlan, model: Model, linear: LinearCurves, curve: PointCurve
 ) -> PointCurve:
     """The curve with its peaks between the points of the path."""
-    stop, answer = plan.scene.excitation.stop, curve.answer
+    stop, a = plan.scene.excitation.stop, curve.answer
     peaks: dict[Side, tuple[CurvePeak, ...]] = {}
     tops: dict[tuple[Side, int], Top] = {}
     for side in SIDES:
-        size, mine = np.abs(curve.accelerance[side]), []
-        for peak in numbered_peaks(model, answer, size, stop):
-            top = _top(model, linear, curve, side, peak)
+        size, mine, limits = np.abs(curve.accelerance[side]), [], linear.stuck_peaks[side]
+        for peak in numbered_peaks(model, a, size, stop):
+            i, top = peak.sample, None
+            if a.linear[max(i - 1, 0) : i + 2].all() and limits:
+                near = min(limits, key=lambda p: abs(p.frequency - peak.frequency))
+                top = Top(near.frequency, near.height, a.x[i], False)
+            else:
+                f = float(a.frequency[i])
+                top = climbed(model, a.balance, a.x[i], f, side, curve.force, peak)
             if top is not None:
                 peak = peak._replace(frequency=top.frequency, height=top.height)
                 tops[side, peak.number] = top
             mine.append(peak)
         peaks[side] = tuple(mine)
     return replace(curve, peaks=peaks, tops=tops)
-
-
-def _top(
-    model: Model, linear: LinearCurves, curve: PointCurve, side: Side, peak: CurvePeak
-) -> Top | None:
-    a, i = curve.answer, peak.sample
-    if a.linear[max(i - 1, 0) : i + 2].all() and linear.stuck_peaks[side]:
-        near = min(linear.stuck_peaks[side], key=lambda p: abs(p.frequency - peak.frequency))
-        return Top(near.frequency, near.height, a.x[i], False)
-    return climbed(model, a.balance, a.x[i], float(a.frequency[i]), side, curve.force, peak)
 
 
 def climbed(
@@ -154,30 +150,33 @@ def climbed(
 # -- folds -----------------------------------------------------------------------------------------
 
 
-def folds_of(curve: PointCurve) -> Iterator[Fold]:
-    """Where the path turns back, with the height that a slow sweep jumps to."""
-    f, size = curve.frequency, np.abs(curve.accelerance["right"])
+def folds_of(f: Array, size: Array) -> Iterator[tuple[CurvePeak, CurvePeak]]:
+    """Where a path turns back from rising frequency, and the highest that a slow sweep up reaches
+    from where it lands then. A sweep down is one up the path from its other end, at -f.
+
+    Parameters
+    ----------
+    f, size
+        (n,) Hz and height along the path.
+    """
     up = rising(f)
     steps = np.sign(np.diff(f))
-    for i in np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 1:
-        turns_back = steps[i - 1] > 0.0
+    low, high = np.minimum(f[:-1], f[1:]), np.maximum(f[:-1], f[1:])
+    for i in np.flatnonzero((steps[:-1] > 0.0) & (steps[1:] < 0.0)) + 1:
         # a stable motion at the same frequency, on the part of the path that is reached next
-        low, high = np.minimum(f[:-1], f[1:]), np.maximum(f[:-1], f[1:])
         on = np.flatnonzero((low <= f[i]) & (f[i] <= high) & up[:-1] & up[1:])
-        on = on[on > i] if turns_back else on[on < i - 1]
+        on = on[on > i]
         if not len(on):
             continue
-        j = on[0] if turns_back else on[-1]
+        j = int(on[0])
         share = (f[i] - f[j]) / (f[j + 1] - f[j]) if f[j + 1] != f[j] else 0.0
-        landing = float(size[j] + share * (size[j + 1] - size[j]))
+        top = CurvePeak(float(f[i]), float(size[j] + share * (size[j + 1] - size[j])), j)
         # and the peak that the sweep reaches from there on
-        way = range(j + 1, len(f)) if turns_back else range(j, -1, -1)
-        at, reached = float(f[i]), landing
-        for k in takewhile(lambda k: up[k], way):
-            if size[k] < reached:
+        for k in takewhile(lambda k: up[k], range(j + 1, len(f))):
+            if size[k] < top.height:
                 break
-            at, reached = float(f[k]), float(size[k])
-        yield Fold(float(f[i]), bool(turns_back), float(size[i]), reached, at)
+            top = CurvePeak(float(f[k]), float(size[k]), k)
+        yield CurvePeak(float(f[i]), float(size[i]), int(i)), top
 
 
 # -- time integration ------------------------------------------------------------------------------
@@ -285,7 +284,7 @@ def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
     """Points of the path from a top down to half its power on either side, the side first on which
     the frequency rises along the path.
     """
-    ways, up = [], curve.rising
+    ways, up = [], rising(curve.frequency)
     for step in (1, -1):
         way = [top]
         while 0 <= way[-1] + step < len(size) and size[way[-1]] > LEAST * size[top]:

@@ -34,6 +34,7 @@ from upd.hbm.springs.response import parabola, response_of
 from upd.linalg.parallel import threads_for
 from upd.results import Case, Result, variable
 from upd.results import quantities as q
+from upd.results.netcdf import Variable
 from upd.scene.forced_contact import SIDES, Side
 
 #: points of a path from one end, before that from the other is taken
@@ -154,12 +155,6 @@ def of_curve(curve: PointCurve) -> RatioPoint:
     return RatioPoint(curve.ratio, tuple(found), not curve.stopped)
 
 
-def ratios_of(plan: ForcedPlan) -> list[float]:
-    """F_C/F_E of the curve, rising."""
-    choice = plan.scene.performance
-    return [float(one) for one in np.geomspace(choice.lowest, choice.highest, choice.points)]
-
-
 def performance_of(
     linear: LinearCurves, points: Iterable[RatioPoint], curves: Iterable[PointCurve]
 ) -> Performance:
@@ -263,43 +258,15 @@ POINTS, MOST_MODE_POINTS = 40, 800
 _M = 1e-3
 
 
-@dataclass(frozen=True)
-class ModeCurve:
-    """A mode over its amplitude.
-
-    Attributes
-    ----------
-    case
-        Contact stiffness and mode; its choice says where the path ended early.
-    acceleration
-        Side -> (n,) amplitude along x at the accelerometer, m/s2.
-    frequency, damping
-        (n,) Hz, and damping ratio.
-    slip, lift
-        (n,) shares of the contact that slips and opens, of all points and the cycle.
-    stuck
-        Hz with all points sticking.
-    centrifugal
-        F_C, N.
-    message
-        Where and why the path ended.
-    """
-
-    case: Case
-    acceleration: Mapping[Side, Array]
-    frequency: Array
-    damping: Array
-    slip: Array
-    lift: Array
-    stuck: float
-    centrifugal: float
-    message: str
-
-
 def mode_over_amplitude(
     plan: ForcedPlan, model: Model, linear: LinearCurves, stiffness: str, in_phase: bool
-) -> ModeCurve:
+) -> tuple[Case, dict[str, Variable]]:
     """The lowest mode in phase or out of phase, from sticking to slipping everywhere.
+
+    Returns
+    -------
+    tuple
+        Contact stiffness and mode, with where the path ended early as its choice; the curve.
 
     Raises
     ------
@@ -325,18 +292,20 @@ def mode_over_amplitude(
     )
     square = (2.0 * np.pi * found.frequency) ** 2
     shares = found.state.mean(axis=1)
+    at, words = "point", "share of all points and the cycle"
+    out = {
+        "frequency": variable(at, found.frequency, "Hz", message=found.message),
+        "damping": variable(at, found.damping, "1", "damping ratio"),
+        "slip": variable(at, shares[:, 1], "1", words),
+        "lift": variable(at, shares[:, 2], "1", words),
+        "stuck_frequency": variable("", stuck, "Hz"),
+        "centrifugal_force": variable("", scene.damper.centrifugal, "N"),
+    }
+    for side in SIDES:
+        acceleration = _M * found.motion(model.row(side)) * square
+        out[f"acceleration_{side}"] = variable(at, acceleration, "m/s2")
     ended = "" if found.status == "complete" else f"path ended after {len(square)} points"
-    return ModeCurve(
-        Case(stiffness=stiffness, mode=mode, choice=ended),
-        {side: _M * found.motion(model.row(side)) * square for side in SIDES},
-        found.frequency,
-        found.damping,
-        shares[:, 1],
-        shares[:, 2],
-        stuck,
-        scene.damper.centrifugal,
-        found.message,
-    )
+    return Case(stiffness=stiffness, mode=mode, choice=ended), out
 
 
 def first_slip(b: Balance, shape: Array, omega: float) -> float:
@@ -378,44 +347,24 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
     return least
 
 
-# -- numbers and arrays ----------------------------------------------------------------------------
-
-
-def mode_results(curve: ModeCurve) -> list[Result]:
+def mode_results(case: Case, curve: Mapping[str, Variable]) -> list[Result]:
     """Largest damping; where it is, and what F_C puts a vibration there, unless it still rises at
     the largest amplitude.
     """
-    case = curve.case
-    a = curve.acceleration["right"]
+    a, damping = curve["acceleration_right"].data, curve["damping"].data
     log_a = np.log(a)
-    at, zeta = parabola(log_a, curve.damping)
+    at, zeta = parabola(log_a, damping)
     near = np.argsort(log_a)
-    frequency = float(np.interp(at, log_a[near], curve.frequency[near]))
+    frequency = float(np.interp(at, log_a[near], curve["frequency"].data[near]))
     acceleration = float(np.exp(at))
     values = {
         q.DAMPING_ACCELERATION: acceleration,
         q.DAMPING_FREQUENCY: frequency,
-        q.DAMPING_SHIFT: frequency / curve.stuck - 1.0,
-        q.FORCE_FOR_DAMPING: curve.centrifugal / acceleration,
+        q.DAMPING_SHIFT: frequency / float(curve["stuck_frequency"].data) - 1.0,
+        q.FORCE_FOR_DAMPING: float(curve["centrifugal_force"].data) / acceleration,
     }
     largest = q.LARGEST_DAMPING.of(zeta, case)
-    if curve.damping.argmax() == a.argmax():
+    if damping.argmax() == a.argmax():
         # it still rises
         return [largest]
     return [largest, *(quantity.of(value, case) for quantity, value in values.items())]
-
-
-def mode_arrays(curve: ModeCurve) -> dict[str, Any]:
-    """The curve, over its points."""
-    at = "point"
-    out: dict[str, Any] = {
-        "frequency": variable(at, curve.frequency, "Hz", message=curve.message),
-        "damping": variable(at, curve.damping, "1", "damping ratio"),
-        "slip": variable(at, curve.slip, "1", "share of all points and the cycle"),
-        "lift": variable(at, curve.lift, "1", "share of all points and the cycle"),
-        "stuck_frequency": variable("", curve.stuck, "Hz"),
-        "centrifugal_force": variable("", curve.centrifugal, "N"),
-    }
-    for side in SIDES:
-        out[f"acceleration_{side}"] = variable(at, curve.acceleration[side], "m/s2")
-    return out

@@ -14,7 +14,13 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures, performance
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, faces_limit, point_limit
+from upd.analyses.forced.curves import (
+    ForcedCurve,
+    LinearCurves,
+    faces_limit,
+    point_limit,
+    rising,
+)
 from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
@@ -55,7 +61,7 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     for name, found in solution.performances.items():
         results += performance.performance_results(name, found)
     for mode in solution.nonlinear_modes:
-        results += performance.mode_results(mode)
+        results += performance.mode_results(*mode)
     scene, beside = solution.plan.scene, (partial(_computed, solution), partial(_nothing, solution))
     results += solution.effects
     return results + measured.measured_results(scene.measured, *beside, scene.excitation.damping)
@@ -264,17 +270,16 @@ def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
     peaks = curve.peaks.get("right", ())
     for peak in peaks:
         jumps = [
-            fold
-            for fold in curve.folds
-            if fold.up
-            and fold.before < fold.reached < (1.0 - _LOWER) * peak.height
-            and min(peaks, key=lambda one: abs(one.frequency - fold.frequency)) is peak
+            (end, top)
+            for end, top in curve.folds
+            if end.height < top.height < (1.0 - _LOWER) * peak.height
+            and min(peaks, key=lambda one: abs(one.frequency - end.frequency)) is peak
         ]
         if jumps:
-            fold = max(jumps, key=lambda one: one.reached - one.before)
+            _, top = max(jumps, key=lambda one: one[1].height - one[0].height)
             case = replace(curve.case, mode=peak.mode)
-            yield q.SWEEP_UP_FREQUENCY.of(fold.at, case, n=peak.number)
-            yield q.SWEEP_UP_ACCELERANCE.of(fold.reached, case, n=peak.number)
+            yield q.SWEEP_UP_FREQUENCY.of(top.frequency, case, n=peak.number)
+            yield q.SWEEP_UP_ACCELERANCE.of(top.height, case, n=peak.number)
 
 
 def _not_reached(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Result]:
@@ -406,7 +411,7 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
     for name, one in solution.performances.items():
         found.append((PERFORMANCE, Case(stiffness=name), performance.performance_arrays(one)))
     for mode in solution.nonlinear_modes:
-        found.append((MODES, mode.case, performance.mode_arrays(mode)))
+        found.append((MODES, *mode))
     out = {
         f"{content} {case}": Group(variables, content=content, case=case)
         for content, case, variables in found
@@ -452,7 +457,7 @@ def _curve_arrays(curve: ForcedCurve[Any]) -> Variables:
             out[f"peak_accelerance_{side}"] = variable(at, height, "(m/s2)/N")
     if isinstance(a, FrequencyResponse):
         words = "0 between two folds, where the frequency falls"
-        return out | {"stable": variable(on, curve.rising.astype(np.int8), "1", words)}
+        return out | {"stable": variable(on, rising(curve.frequency).astype(np.int8), "1", words)}
     if isinstance(a, InterfaceResponse):
         jumped = np.zeros(len(curve.frequency), np.int8)
         jumped[list(a.jumps)] = 1

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from upd.analyses.forced.interface_model import (
 from upd.analyses.forced.measures import Loop
 from upd.analyses.forced.model import Array, Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
-from upd.analyses.forced.performance import ModeCurve, Performance, RatioPoint
+from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.statics import admissible, face_laws
 from upd.analyses.measured import CurvePeak
@@ -40,6 +40,7 @@ from upd.mesh import IntArray
 from upd.progress import Stages
 from upd.results import Case, Result
 from upd.results import quantities as q
+from upd.results.netcdf import Variable
 from upd.scene.forced_contact import SIDES, StiffnessChoice
 from upd.vary.solve import changed
 from upd.vary.variation import SolvedVariation
@@ -81,16 +82,10 @@ class ForcedSolution:
     faces: dict[str, WholeFaces] = field(default_factory=dict)
     band: list[Result] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
-    nonlinear_modes: list[ModeCurve] = field(default_factory=list)
+    nonlinear_modes: list[tuple[Case, dict[str, Variable]]] = field(default_factory=list)
     omissions: list[Resolved] = field(default_factory=list)
     levels: list[SolvedVariation] = field(default_factory=list)
     effects: list[Result] = field(default_factory=list)
-
-    @property
-    def order(self) -> int:
-        """Largest order of a matrix that the curves are read with."""
-        reduced = [len(one.M) for one in self.models.values()]
-        return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
 
     def places(self, stiffness: str) -> ContactPlaces:
         """Of the contact points, or of the nodes of whole faces."""
@@ -186,9 +181,9 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
             for name, model in solution.models.items():
                 springs = make_springs(plan, model)
                 _sweep(solution, name, springs.march, springs.at_rest(), stages)
-            for work in _mode_work(solution):
+            for into, function, arguments, _ in _mode_work(solution):
                 with stages("nonlinear modes", "damping over amplitude"):
-                    work.into(work.function(*work.arguments))
+                    into(function(*arguments))
         else:
             with SideProcesses(*_MODULES) as beside:
                 _balanced_points(solution, beside, stages)
@@ -252,33 +247,20 @@ def _models(solution: ForcedSolution, stages: Stages) -> None:
 # -- harmonic balance ------------------------------------------------------------------------------
 
 
-class _Work(NamedTuple):
-    """What a process beside this one may do, and where its result goes.
-
-    Attributes
-    ----------
-    into
-        Takes the result.
-    function, arguments
-        The job.
-    needed
-        Whether there is no answer without it.
-    """
-
-    into: Callable[[Any], object]
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    needed: bool = False
+#: what a process beside this one may do: what takes the result, the function and its arguments,
+#: whether there is no answer without it
+_Work = tuple[Callable[[Any], object], Callable[..., Any], tuple[Any, ...], bool]
 
 
 def _done(beside: SideProcesses, work: Sequence[_Work]) -> None:
-    for one, found in zip(work, beside.run([one[1:3] for one in work]), strict=True):
+    results = beside.run([(function, arguments) for _, function, arguments, _ in work])
+    for (into, function, _, needed), found in zip(work, results, strict=True):
         if not isinstance(found, UpdError):
-            one.into(found)
-        elif one.needed:
+            into(found)
+        elif needed:
             raise found
         else:
-            log.info("%s: %s", one.function.__name__, one_line(found))
+            log.info("%s: %s", function.__name__, one_line(found))
 
 
 def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: Stages) -> None:
@@ -297,17 +279,18 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
                 variants[name].append(again.make_variant(*given, bodies, of))
             else:
                 into = variants[name].append
-                work.append(_Work(into, again.make_variant, (*given, None, of), needed=True))
+                work.append((into, again.make_variant, (*given, None, of), True))
     order = list(scene.excitation.centrifugal_to_force)
     for name, model in solution.models.items():
         # those with most slip first
         for ratio in sorted(order):
             curve = plan, model, solution.linear[name], name, ratio
-            work.append(_Work(solution.curves.append, solve_curve, curve, needed=True))
+            work.append((solution.curves.append, solve_curve, curve, True))
     if scene.wants("performance"):
-        for ratio in performance.ratios_of(plan):
+        wanted = scene.performance
+        for ratio in np.geomspace(wanted.lowest, wanted.highest, wanted.points).tolist():
             point = plan, solution.models[names[0]], ratio
-            work.append(_Work(points.append, performance.peaks_at, point))
+            work.append((points.append, performance.peaks_at, point, False))
     work += _mode_work(solution)
     with stages("friction", f"{len(names) * len(order)} curves, {len(work)} pieces"), quiet():
         _done(beside, work)
@@ -330,7 +313,7 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
         for in_phase in (True, False):
             mode = solution.plan, model, solution.linear[name], name, in_phase
             into = solution.nonlinear_modes.append
-            yield _Work(into, performance.mode_over_amplitude, mode, needed=True)
+            yield into, performance.mode_over_amplitude, mode, True
 
 
 def _around(
@@ -348,7 +331,7 @@ def _around(
         given = with_totals(plan, name, model), name, model, solution.linear[name]
         run = again.Run(*given, tuple(again.run_curve(one) for one in mine))
         work += [
-            _Work(solution.levels.append, again.solve_again, (run, one)) for one in variants[name]
+            (solution.levels.append, again.solve_again, (run, one), False) for one in variants[name]
         ]
         if scene.left_out.solves:
             solution.omissions += inputs.elastic_changes(run, bodies)
@@ -357,13 +340,13 @@ def _around(
                 curve = partial(performance.performance_of, solution.linear[name], points, mine)
                 near = curve().best
                 work += [
-                    _Work(points.append, performance.peaks_at, (plan, model, ratio))
+                    (points.append, performance.peaks_at, (plan, model, ratio), False)
                     for ratio in curve().beside_best()
                 ]
                 if near is not None and variants[name]:
                     more = replace(plan, scene=changed(scene, again.more_harmonics(scene)[1]))
                     point = more, model, near.ratio
-                    work.append(_Work(finer.append, performance.peaks_at, point))
+                    work.append((finer.append, performance.peaks_at, point, False))
             if scene.wants("inputs") or scene.left_out.solves:
                 work += _at_few_harmonics(solution, run, bodies)
             if scene.wants("band"):
@@ -382,16 +365,18 @@ def _at_few_harmonics(solution: ForcedSolution, run: again.Run, bodies: Bodies) 
     if few is None:
         return
     for variant in inputs.input_variants(few, bodies) if scene.wants("inputs") else ():
-        yield _Work(
+        yield (
             lambda one: solution.effects.extend(inputs.effects_of(few, one)),
             again.solve_again,
             (few, variant),
+            False,
         )
     if scene.left_out.solves and (along := inputs.along_the_damper(few, bodies)):
-        yield _Work(
+        yield (
             lambda one: solution.omissions.extend(inputs.along_changes(few, one)),
             again.solve_again,
             along,
+            False,
         )
 
 
@@ -412,7 +397,7 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
         for choice, other, start in choices:
             into = partial(_into_band, solution, name, choice)
             point = plan, other, ratio, start
-            yield _Work(into, performance.peaks_at, point, needed=True)
+            yield into, performance.peaks_at, point, True
 
 
 def _into_band(solution: ForcedSolution, name: str, choice: str, point: RatioPoint) -> None:

@@ -76,23 +76,18 @@ def check_sources(scene: ForcedScene) -> None:
         try:
             if choice.run is not None:
                 _law(choice, Stages())
-                _check_damper(scene, f"run {choice.run}", _scene_of_run(Path(choice.run)))
+                contact = None
+                # the folder may not hold it any more, or not as this version reads it
+                with suppress(InputError):
+                    contact = load_scene(Path(choice.run) / "scene.toml")
+                known = contact is not None and contact.analysis in CONTACT_WANTS
+                _check_damper(scene, f"run {choice.run}", contact if known else None)
             elif choice.scene is not None:
                 _check_damper(scene, f"scene {choice.scene}", _contact_scene(choice))
         except InputError as error:
             problems.append(f"stiffness.{name}: {error}")
     if problems:
         raise InputError("\n".join(problems))
-
-
-def _scene_of_run(folder: Path) -> Scene | None:
-    """The contact scene of a run folder; None when the folder does not hold it any more, or not as
-    this version reads it.
-    """
-    with suppress(InputError):
-        scene = load_scene(folder / "scene.toml")
-        return scene if scene.analysis in CONTACT_WANTS else None
-    return None
 
 
 def _check_damper(scene: ForcedScene, source: str, contact: Scene | None) -> None:
@@ -362,8 +357,15 @@ def _seated_shares(plan: Plan[ForcedScene], stages: Stages) -> Array:
 
     Without gaps the contact is homogeneous: the shares do not depend on F_C.
     """
-    plan = _eight_nodes(plan)
-    F, mu = plan.scene.damper.centrifugal, plan.scene.contact.friction
+    scene = plan.scene
+    F, mu = scene.damper.centrifugal, scene.contact.friction
+    # the contact takes faces of four nodes: the half of the same rig of eight-node solids
+    plan = replace(
+        plan,
+        scene=replace(scene, mesh=replace(scene.mesh, element="hex8i")),
+        parameters={**plan.parameters, "element_nodes": 8, "symmetry": "half"},
+        symmetry="half",
+    )
     with stages("static state", "F_C raised on both faces with friction"):
         of = make_interface(plan, make_bodies(plan))
         try:
@@ -374,17 +376,6 @@ def _seated_shares(plan: Plan[ForcedScene], stages: Stages) -> Array:
                 'contact.static = "frictionless", or T/N of both faces'
             ) from error
     return np.asarray((of.face_forces(found)[-1] / F)[:, [0, 2]].T)
-
-
-def _eight_nodes(plan: Plan[ForcedScene]) -> Plan[ForcedScene]:
-    """The same rig of eight-node solids, the half of it: the contact takes faces of four nodes."""
-    scene = plan.scene
-    return replace(
-        plan,
-        scene=replace(scene, mesh=replace(scene.mesh, element="hex8i")),
-        parameters={**plan.parameters, "element_nodes": 8, "symmetry": "half"},
-        symmetry="half",
-    )
 
 
 # -- the contact points ----------------------------------------------------------------------------

@@ -390,16 +390,13 @@ def response_meshes(scene: ForcedScene, asked: Asked, *, vary: str = "mesh") -> 
     # Gauss points do not hang on the mesh
     keeps = whole_faces or scene.contact.rule == GAUSS
     base = (*_base(scene), *(() if keeps else _gauss(_ON_MESHES)))
+    # the usual refinements; whole ones where the recipe takes no others
+    default = recipes.parameters(scene.recipe).__dataclass_fields__["refine"].default
+    whole = isinstance(default, int)
     for element in (scene.mesh.element,) if vary == "mesh" else known:
-        for refine in refined or _usual(scene, element):
+        for refine in refined or [n for n in _REFINE[element] if n >= 1 or not whole]:
             overrides = (*base, ("geometry.refine", refine), ("mesh.element", element))
             yield Variation(element, f"refine {refine:g}", overrides, 1.0 / refine)
-
-
-def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
-    """The usual refinements; whole ones where the recipe takes no others."""
-    default = recipes.parameters(scene.recipe).__dataclass_fields__["refine"].default
-    return tuple(n for n in _REFINE[element] if n >= 1 or not isinstance(default, int))
 
 
 def _notes(scene: ForcedScene) -> Iterator[str]:
@@ -514,12 +511,11 @@ def _contact_report(
     """Numbers of every level and their changes from the finest faces, whatever the contact is
     called.
     """
-
-    def nameless(one: SolvedPoint) -> SolvedPoint:
+    nameless = []
+    for one in solved:
         results = (replace(r, case=replace(r.case, stiffness="")) for r in one.outcome.results)
-        return replace(one, outcome=replace(one.outcome, results=tuple(results)))
-
-    return finest_report(scene, [nameless(one) for one in solved], names)
+        nameless.append(replace(one, outcome=replace(one.outcome, results=tuple(results))))
+    return finest_report(scene, nameless, names)
 
 
 def _title(scene: ForcedScene, vary: str) -> str:
