@@ -31,14 +31,16 @@ def laws(
     found: CoupledContact,
     B: np.ndarray | None = None,
     asked: Any = None,
+    offset: Any = 0.0,
 ) -> float:
     """Worst misfit of equilibrium, Signorini and Coulomb over all steps, each by its own size."""
     n = len(h)
     B = np.kron(np.eye(len(C) // n), np.ones((n, 1))) if B is None else B
     worst, before = 0.0, np.zeros((n, len(C) // n - 1))
+    offset = np.broadcast_to(offset, (len(found.force), len(C)))
     for k in range(len(found.force)):
         f, s = found.force[k], found.displacement[k]
-        w = (B @ s - C @ f.T.ravel()).reshape(-1, n).T
+        w = (B @ s - C @ f.T.ravel() - offset[k]).reshape(-1, n).T
         g, size = h - w[:, 0], np.abs(f).max() + 1e-30
         length = np.abs(h).max() + np.abs(B @ s).max() + np.abs(C).max() * size
         tangential = np.linalg.norm(f[:, 1:], axis=1)
@@ -174,6 +176,60 @@ def test_wedge_that_slides_far(angle: float, friction: float, way: float) -> Non
         N = face_forces(angle, angle, 10.0, sign * friction).normal_left
         assert found.force[k, :9, 0].sum() == pytest.approx(N, rel=1e-7)
         assert found.force[k, 9:, 0].sum() == pytest.approx(N, rel=1e-7)
+
+
+def wedge(
+    angle: float, shape: tuple[int, int], out: float, soft: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Two faces of a rigid wedge with all six motions, `out` mm off its middle, on elastic halves
+    whose supports give way `soft` times as much.
+    """
+    nx, ny = shape
+    m, a, own = nx * ny, np.radians(angle), lattice(nx, ny)
+    u = 0.1 * (np.arange(m) % nx - (nx - 1) / 2)
+    v = 0.1 * (np.arange(m) // nx - (ny - 1) / 2)
+    B, C = np.zeros((3, 2, m, 6)), np.zeros((3, 2, m, 3, 2, m))
+    for k, side in enumerate((-1.0, 1.0)):
+        normal = np.array([side * np.sin(a), 0.0, np.cos(a)])
+        along, up = np.array([0.0, 1.0, 0.0]), np.array([-side * np.cos(a), 0.0, np.sin(a)])
+        at = np.array([side * out, 0.0, 0.0]) + np.outer(v, along) + np.outer(u, up)
+        for j, axis in enumerate(np.eye(3)):
+            for c, way in enumerate((normal, along, up)):
+                B[c, k, :, j], B[c, k, :, 3 + j] = axis @ way, np.cross(axis, at) @ way
+        C[:, k, :, :, k] = own.reshape(3, m, 3, m)
+    C = C.reshape(6 * m, 6 * m)
+    for k in range(2):
+        held = np.zeros_like(B)
+        held[:, k] = B[:, k]
+        R = held.reshape(6 * m, 6) * np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
+        C = C + soft * np.abs(own).max() * R @ R.T
+    return C, B.reshape(6 * m, 6)
+
+
+@pytest.mark.parametrize(
+    ("angle", "friction", "shape", "out", "soft", "way"),
+    [
+        (30.0, 0.6, (3, 3), 3.0, 30.0, [0.7, 0.0, 0.0]),
+        (45.0, 0.6, (5, 2), 1.0, 300.0, [1.6e-3, 0.0, 0.0]),
+        (60.0, 0.6, (4, 3), 3.0, 30.0, [1.1e-3, 0.0, -4e-4]),
+        (30.0, 0.9, (4, 2), 0.3, 1.0, [4e-3, 0.0, -6e-3]),
+        (30.0, 0.6, (4, 2), 1.0, 0.0, [-4e-3, 0.0, 8e-3]),
+    ],
+)
+def test_wedge_on_soft_blades_that_slides_far(
+    angle: float, friction: float, shape: tuple[int, int], out: float, soft: float, way: list[float]
+) -> None:
+    """The damper tips onto few nodes as it slides: Newton with all of the friction opens too many
+    at once, and friction has to rise.
+    """
+    C, B = wedge(angle, shape, out, soft)
+    n = len(C) // 3
+    load = 3 * [[0.0, 0.0, 10.0, 0.0, 0.0, 0.0]]
+    moved = np.where(np.arange(3 * n) % n < n // 2, 0.0, B[:, :3] @ np.array(way))
+    offset = [0.0 * moved, moved, 0.0 * moved]
+    found = coupled_contact(C, np.zeros(n), friction, load=load, columns=B, offset=offset)
+    assert found.status == "converged"
+    assert laws(C, np.zeros(n), friction, found, B, load, offset) < 1e-9
 
 
 def test_withdrawn_wedge_that_jams() -> None:
