@@ -417,7 +417,8 @@ def report(runs: list[Path], *, out: Path | None = None) -> None:
     out
         File of the comparison; by default comparison.html beside the first run folder.
     """
-    from upd.report import write_comparison, write_report
+    from upd.report import write_report
+    from upd.report.run_page import write_comparison
 
     if len(runs) == 1:
         if out is not None:

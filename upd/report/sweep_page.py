@@ -95,7 +95,11 @@ def write_sweep_report(folder: Path) -> Path:
 
 def sweep_sections(sweep: SweepFolder) -> list[Section]:
     """The page of a sweep."""
-    drawn, stages = _charts(sweep), sweep.data["cost"].get("stages_s", {})
+    drawn, cost = _charts(sweep), sweep.data["cost"]
+    seconds = [p["seconds"] for p in sweep.points] or [0.0]
+    total, memory = math.fsum(seconds), cost.get("peak_rss_mb", 0.0)
+    each = f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s)"
+    costs = f"{each}, {total:.1f} s for all together, {memory:.0f} MB of memory at most."
     none = "The sweep left no figures: nothing varies, or no point was solved."
     scene = "The scene of all points; the parameters above replace its entries."
     *before, points = (Section(one.heading, [one]) for one in sweep_tables(sweep, MOST_ROWS))
@@ -104,7 +108,7 @@ def sweep_sections(sweep: SweepFolder) -> list[Section]:
         *before,
         Section("Figures", charts=drawn, texts=[none] * (not drawn)),
         points,
-        Section("Cost", [stage_table(stages)], texts=[_costs(sweep)]),
+        Section("Cost", [stage_table(cost.get("stages_s", {}))], texts=[costs]),
         Section("Scene file", texts=[scene], file=sweep.data["text"]),
     ]
 
@@ -128,10 +132,13 @@ def sweep_tables(sweep: SweepFolder, most: int) -> list[AnswerTable]:
 
 def _grid(sweep: SweepFolder) -> Section:
     """What was varied."""
-    columns = {
-        "parameter": [p.path for p in sweep.axes],
-        "values": [_values(p) for p in sweep.axes],
-    }
+    values = []
+    for parameter in sweep.axes:
+        shown = [parameter.shown(k) for k in range(len(parameter.values))]
+        # of many the first and the last
+        shown = shown if len(shown) <= _FEW else [*shown[:3], "...", shown[-1]]
+        values.append(f"{', '.join(shown)} {unit_label(parameter.unit)}".rstrip())
+    columns = {"parameter": [p.path for p in sweep.axes], "values": values}
     points, heading = counted(len(sweep.points), "point"), "Grid"
     text = f"{points}{': every value with every other' * (len(sweep.axes) > 1)}."
     if sample := sweep.data.get("sample"):
@@ -143,13 +150,6 @@ def _grid(sweep: SweepFolder) -> Section:
         )
     notes = map(sentence, sweep.data["plan"].get("notes", []))
     return Section(heading, [filled(heading, columns)], texts=[text, *notes])
-
-
-def _values(parameter: charts.Parameter) -> str:
-    """The values of a parameter with their unit, of many the first and the last."""
-    shown = [parameter.shown(k) for k in range(len(parameter.values))]
-    shown = shown if len(shown) <= _FEW else [*shown[:3], "...", shown[-1]]
-    return f"{', '.join(shown)} {unit_label(parameter.unit)}".rstrip()
 
 
 def _charts(sweep: SweepFolder) -> list[Chart]:
@@ -223,11 +223,3 @@ def _points_table(sweep: SweepFolder, most: int) -> AnswerTable:
         "arrays with named axes. A number without a unit is a ratio or a count."
     )
     return filled("Table", columns, " ".join(notes))
-
-
-def _costs(sweep: SweepFolder) -> str:
-    """Seconds of the points, memory."""
-    seconds = [p["seconds"] for p in sweep.points] or [0.0]
-    total, memory = math.fsum(seconds), sweep.data["cost"].get("peak_rss_mb", 0.0)
-    each = f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s)"
-    return f"{each}, {total:.1f} s for all together, {memory:.0f} MB of memory at most."
