@@ -15,14 +15,8 @@ from upd.scene import quantities as q
 INSIDE = ("text", "uncertain", "fitted")
 
 
-class Table:
-    """Base of all tables of a scene: no other keys, no number that is not finite."""
-
-    __pydantic_config__ = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
-
-
 @dataclass(frozen=True)
-class MaterialData(Table):
+class MaterialData:
     """Elastic constants of one body.
 
     Attributes
@@ -45,7 +39,7 @@ class MaterialData(Table):
 
 
 @dataclass(frozen=True)
-class MeshChoice(Table):
+class MeshChoice:
     """Element family and mirror symmetry.
 
     Attributes
@@ -65,7 +59,7 @@ class MeshChoice(Table):
 
 
 @dataclass(frozen=True)
-class SolverChoice(Table):
+class SolverChoice:
     """Linear solver and the memory it may use.
 
     Attributes
@@ -90,7 +84,7 @@ class SolverChoice(Table):
 
 
 @dataclass(frozen=True)
-class LeftOut(Table):
+class LeftOut:
     """Largest relative change of a number by an effect left out before the run warns.
 
     Attributes
@@ -123,7 +117,7 @@ class LeftOut(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rotation(Table):
+class Rotation:
     """The centrifugal force on a damper, F_C, or what gives it: F_C = m r w^2.
 
     Attributes
@@ -141,7 +135,7 @@ class Rotation(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SceneBase(Table):
+class SceneBase:
     """What every scene has. ``geometry`` holds the recipe's name under "recipe" and its parameters
     beside it, in mm.
 
@@ -162,6 +156,8 @@ class SceneBase(Table):
         The recipe and its parameters.
     """
 
+    #: of all tables of a scene: no other keys, no number that is not finite
+    __pydantic_config__ = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
     #: whether masses count
     moves: ClassVar[bool] = True
     #: tables that only this kind of scene has
@@ -244,7 +240,7 @@ Fit = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class FaceFriction(Table):
+class FaceFriction:
     """Coulomb friction on both faces of the damper, and their fit.
 
     Attributes

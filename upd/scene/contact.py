@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import quantities as q
-from upd.scene.base import MaterialData, Rotation, SceneBase, Table, repeated
+from upd.scene.base import MaterialData, Rotation, SceneBase, repeated
 from upd.scene.rotation import rotation_problems, volume_of
 
 #: body whose density is the damper's
@@ -41,7 +41,7 @@ Coupling = Literal["uncoupled", "coupled"]
 
 
 @dataclass(frozen=True)
-class ContactData(Table):
+class ContactData:
     """Coulomb friction and what the solver may assume.
 
     Attributes
@@ -128,7 +128,7 @@ class Loads(Rotation):
 
 
 @dataclass(frozen=True)
-class LawChoice(Table):
+class LawChoice:
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
     Attributes

@@ -20,7 +20,6 @@ from upd.scene.base import (
     DamperChoice,
     MeshChoice,
     RigBase,
-    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
@@ -77,7 +76,7 @@ Samples = Annotated[
 
 
 @dataclass(frozen=True)
-class BladeReduction(Table):
+class BladeReduction:
     """Reduction of the blades.
 
     Attributes
@@ -91,7 +90,7 @@ class BladeReduction(Table):
 
 
 @dataclass(frozen=True)
-class HarmonicForce(Table):
+class HarmonicForce:
     """A force along x at mid-core of a blade, a F_E cos(k 2 pi f t + phase).
 
     Attributes
@@ -113,7 +112,7 @@ class HarmonicForce(Table):
 
 
 @dataclass(frozen=True)
-class ExcitationChoice(Table):
+class ExcitationChoice:
     """Harmonic forces at mid-core of the blades, swept between two frequencies.
 
     Attributes
@@ -156,7 +155,7 @@ class ExcitationChoice(Table):
 
 
 @dataclass(frozen=True)
-class BalanceChoice(Table):
+class BalanceChoice:
     """Harmonic balance, or time integration in its place.
 
     Attributes
@@ -181,7 +180,7 @@ class BalanceChoice(Table):
 
 
 @dataclass(frozen=True)
-class PerformanceChoice(Table):
+class PerformanceChoice:
     """F_C/F_E of the performance curve, evenly spread on a logarithmic axis.
 
     Attributes

@@ -17,7 +17,6 @@ from upd.measured.curve import QUANTITIES, AskedCurve, CurveLabel, MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
-from upd.scene.base import Table
 from upd.units import UNITS
 
 Array = NDArray[np.float64]
@@ -28,7 +27,7 @@ ResponseUnit = Annotated[str, q.one_of(_UNITS), q.Example('"(m/s2)/N"')]
 
 
 @dataclass(frozen=True)
-class MeasuredChoice(Table):
+class MeasuredChoice:
     """A measured frequency response, drawn over the computed ones and compared with them.
 
     Attributes

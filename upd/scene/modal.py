@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import MeshChoice, RigBase, Table, repeated, rig_problems
+from upd.scene.base import MeshChoice, RigBase, repeated, rig_problems
 from upd.scene.measured import (
     FROM_MEASURED,
     UNTIL_READ,
@@ -25,7 +25,7 @@ ModalWant = Annotated[str, q.one_of(MODAL_WANTS), q.Example('"free"', '"glued"')
 
 
 @dataclass(frozen=True)
-class ModesChoice(Table):
+class ModesChoice:
     """Modes below a frequency, for one or both arrangements of the platforms.
 
     Attributes
@@ -43,7 +43,7 @@ class ModesChoice(Table):
 
 
 @dataclass(frozen=True)
-class ReductionChoice(Table):
+class ReductionChoice:
     """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
 
     Attributes
@@ -80,7 +80,7 @@ class ReductionChoice(Table):
 
 
 @dataclass(frozen=True)
-class ResponseChoice(Table):
+class ResponseChoice:
     """Linear frequency response between two frequencies.
 
     Attributes
