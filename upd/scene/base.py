@@ -117,24 +117,6 @@ class LeftOut:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rotation:
-    """The centrifugal force on a damper, F_C, or what gives it: F_C = m r w^2.
-
-    Attributes
-    ----------
-    radius
-        Of the damper's centre of mass from the axis of rotation.
-    speed
-        Of the rotation.
-    """
-
-    centrifugal: q.Centrifugal | None = None
-    mass: q.Mass | None = None
-    radius: q.Radius | None = None
-    speed: q.Speed | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
 class SceneBase:
     """What every scene has. ``geometry`` holds the recipe's name under "recipe" and its parameters
     beside it, in mm.
@@ -181,6 +163,12 @@ class SceneBase:
         return str(self.geometry["recipe"])
 
     @property
+    def body_materials(self) -> Mapping[str, MaterialData]:
+        """Material of every body; one of all bodies under "all"."""
+        known: Any = self
+        return known.materials if hasattr(known, "materials") else {"all": known.material}
+
+    @property
     def estimates(self) -> bool:
         """Whether errors are estimated."""
         return bool(self.accuracy != q.UNKNOWN)
@@ -201,10 +189,6 @@ class SceneBase:
         InputError whose arguments are the problems.
         """
         return self
-
-    def problems(self) -> Iterator[str]:
-        """What does not fit together."""
-        yield from ()
 
 
 def repeated(path: str, values: Sequence[float | str]) -> list[str]:
@@ -262,7 +246,7 @@ class FaceFriction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DamperChoice(Rotation):
+class DamperChoice:
     """The rigid damper; mass and inertia come from its mesh.
 
     Attributes
@@ -271,11 +255,18 @@ class DamperChoice(Rotation):
         Force through its centre of mass, upwards, F_C; or "from speed": F_C = m r w^2.
     mass
         Of the damper, spread evenly over its volume, instead of its density.
+    radius
+        Of the damper's centre of mass from the axis of rotation.
+    speed
+        Of the rotation.
     density
         Of the damper, where it is not of the blades' material; the density or the mass.
     """
 
     centrifugal: q.Centrifugal = 350.0
+    mass: q.Mass | None = None
+    radius: q.Radius | None = None
+    speed: q.Speed | None = None
     density: q.Density | None = None
 
 
@@ -290,11 +281,6 @@ class RigBase(SceneBase):
     """
 
     material: MaterialData
-
-    @property
-    def body_materials(self) -> Mapping[str, MaterialData]:
-        """The one material, of all bodies."""
-        return {"all": self.material}
 
     @property
     def arrangement(self) -> str:

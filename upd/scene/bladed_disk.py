@@ -4,7 +4,7 @@ response.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
@@ -144,11 +144,6 @@ class BladedDiskScene(SceneBase):
     rotation: SpinChoice
     damper: WedgeChoice = field(default_factory=WedgeChoice)
     response: WaveChoice = field(default_factory=WaveChoice)
-
-    @property
-    def body_materials(self) -> Mapping[str, MaterialData]:
-        """The one material."""
-        return {"all": self.material}
 
     @property
     def n_sectors(self) -> int:

@@ -31,9 +31,7 @@ from upd.scene.measured import (
     FittedMode,
     MeasuredChoice,
     fitted_modes,
-    main_ratio,
     measured_problems,
-    modal_ratios,
 )
 from upd.scene.rotation import with_damper
 
@@ -248,6 +246,10 @@ class ForcedScene(RigBase):
     def modal_damping(self, frequency: Array, share: Array) -> Array:
         """Damping ratios (m,) of modes of the blades without damper.
 
+        A mode takes the ratio of the fitted mode next to it in frequency (by ratio), of each blade
+        by the share of the modal mass that moves there; a blade that was not measured takes the
+        other's.
+
         Parameters
         ----------
         frequency
@@ -255,7 +257,16 @@ class ForcedScene(RigBase):
         share
             (m, 2) of the left and of the right blade in the modal mass.
         """
-        return modal_ratios(self.fitted, self.excitation.damping, frequency, share)
+        if not self.fitted:
+            return np.full(len(frequency), self.excitation.damping)
+        f = np.maximum(frequency, np.finfo(float).tiny)
+        ratios = np.zeros_like(share)
+        for k, side in enumerate(SIDES):
+            mine = [one for one in self.fitted if one[0] == side] or self.fitted
+            known, zeta = (np.array([one[i] for one in mine]) for i in (1, 2))
+            nearest = np.abs(np.log(f)[:, None] - np.log(known)).argmin(axis=1)
+            ratios[:, k] = zeta[nearest]
+        return np.asarray((share * ratios).sum(axis=1) / share.sum(axis=1))
 
     @property
     def stiffnesses(self) -> dict[str, StiffnessChoice]:
@@ -283,9 +294,9 @@ class ForcedScene(RigBase):
         if 0.0 in e.force:
             problems.append("excitation.force: 0 N excites nothing; give a positive force")
         changed: ForcedScene = with_damper(self, data, problems)
-        fitted = fitted_modes(self.measured, data, "excitation")
+        fitted, ratio = fitted_modes(self.measured, data, "excitation")
         if fitted:
-            changed, e = replace(changed, fitted=fitted), replace(e, damping=main_ratio(fitted))
+            changed, e = replace(changed, fitted=fitted), replace(e, damping=ratio)
         ratios = tuple(changed.damper.centrifugal / force for force in e.force)
         e = replace(e, centrifugal_to_force=ratios or e.centrifugal_to_force)
         return replace(changed, excitation=e)

@@ -15,7 +15,6 @@ from upd.scene.measured import (
     UNTIL_READ,
     MeasuredChoice,
     fitted_modes,
-    main_ratio,
     measured_problems,
 )
 
@@ -132,10 +131,8 @@ class ModalScene(RigBase):
 
     def derived(self, data: Mapping[str, Any]) -> ModalScene:
         """With damping from measured curves."""
-        fitted = fitted_modes(self.measured, data, "response")
-        if not fitted:
-            return self
-        return replace(self, response=replace(self.response, damping=main_ratio(fitted)))
+        fitted, ratio = fitted_modes(self.measured, data, "response")
+        return replace(self, response=replace(self.response, damping=ratio)) if fitted else self
 
     def problems(self) -> Iterator[str]:
         """What does not fit together."""
