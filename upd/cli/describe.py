@@ -21,7 +21,6 @@ from upd.plot.answer_table import AnswerTable
 from upd.scene import load_scene
 from upd.scene.keys import (
     SceneKey,
-    absent_keys,
     chosen_keys,
     recipe_keys,
     scene_keys,
@@ -43,7 +42,7 @@ def described(what: str, overrides: Sequence[str] = ()) -> tuple[str, list[Scene
         return f"Recipe {what}", recipe_keys(what)
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return title, scene_keys(scene) + absent_keys(scene)
+    return title, scene_keys(scene, absent=True)
 
 
 def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: str) -> None:

@@ -146,11 +146,6 @@ class ExcitationChoice:
         q.Example('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
     ] = (HarmonicForce(),)
 
-    @property
-    def highest_harmonic(self) -> int:
-        """The highest that is excited."""
-        return max(one.harmonic for one in self.forces)
-
 
 @dataclass(frozen=True)
 class BalanceChoice:
@@ -313,7 +308,8 @@ class ForcedScene(RigBase):
                 "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio "
                 "without size; give a positive force"
             )
-        highest = max(b.harmonics, e.highest_harmonic)
+        excited = max(one.harmonic for one in e.forces)
+        highest = max(b.harmonics, excited)
         if b.samples != "auto" and b.samples <= 2 * highest:
             yield (
                 f"balance.samples: {b.samples} cannot carry harmonic {highest}; take more than "
@@ -321,10 +317,10 @@ class ForcedScene(RigBase):
             )
         if not combined_forces(e):
             yield "excitation.forces: cancel each other; give forces that excite something"
-        elif (springs or b.method == "balance") and b.harmonics < e.highest_harmonic:
+        elif (springs or b.method == "balance") and b.harmonics < excited:
             yield (
                 f"balance.harmonics: {b.harmonics} do not carry the force in harmonic "
-                f"{e.highest_harmonic}; write {e.highest_harmonic} or more"
+                f"{excited}; write {excited} or more"
             )
         if self.performance.lowest >= self.performance.highest:
             yield "performance.lowest: is not below performance.highest"
