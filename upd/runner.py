@@ -26,7 +26,7 @@ from upd.report.notebook import RunResult, write_curves, write_figures
 from upd.results import Check, Estimates, Result, write_netcdf
 from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
 from upd.results.netcdf import DIGEST, file_digest
-from upd.results.number import with_estimates, with_inputs
+from upd.results.number import with_estimates
 from upd.scene import AnyScene, as_scene
 from upd.scene.keys import scene_as_run
 from upd.vary.inputs import input_parts
@@ -199,7 +199,11 @@ def _collected(
     else:
         if solution.plan.scene.estimates:
             results = with_estimates(results, analysis.estimate(solution, results, stages))
-        results = with_inputs(results, input_parts(analysis, solution, results, stages))
+        inputs = input_parts(analysis, solution, results, stages)
+        results = tuple(
+            r if r.withheld else replace(r, inputs=inputs.get((r.name, r.case), ()))
+            for r in results
+        )
     return RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,

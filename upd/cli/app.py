@@ -91,7 +91,7 @@ def run(
     full
         Print every number, effect and self-check, and the seconds of each stage.
     """
-    from upd.cli.tables import print_result
+    from upd.cli.tables import print_lines
     from upd.runner import run as run_scene
 
     loaded = _loaded(scene, set)
@@ -109,12 +109,14 @@ def run(
             terminal.errors.print(f"The log and what converged are in {error.folder}")
         if error.folder is None or error.result is None:
             raise
-        print_result(terminal.console, error.result, full=full)
+        lines = error.result.answer(terminal.console.width, full=full)
+        print_lines(terminal.console, lines)
         if report and not (error.folder / "report.html").exists():
             terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
         raise
     # faults of pictures are printed once, beside the answer
-    print_result(terminal.console, replace(result, faults=()), full=full)
+    shown = replace(result, faults=())
+    print_lines(terminal.console, shown.answer(terminal.console.width, full=full))
     for fault in result.faults:
         warn(fault, "yellow")
 

@@ -54,20 +54,18 @@ def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: st
     console.print(Text(title, "bold"))
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
         heads = ("key", "value", "unit", "bounds", "what it is")
-        rows = tuple((k.name, _value(k), k.unit, k.bounds, _meaning(k)) for k in mine)
-        print_table(console, AnswerTable(f"[{'.'.join(steps)}]" if steps else "", heads, rows))
+        rows = []
+        for key in mine:
+            value, meaning = key.value or key.default, key.meaning
+            if key.value and key.value != key.default != "must be given":
+                value += f" (default {key.default})"
+            if key.cost != "none":
+                meaning += f" Cost: {key.cost}."
+            rows.append((key.name, value, key.unit, key.bounds, meaning))
+        heading = f"[{'.'.join(steps)}]" if steps else ""
+        print_table(console, AnswerTable(heading, heads, tuple(rows)))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
     console.print(Text(f"A key in full: {example}.", "dim"))
-
-
-def _value(key: SceneKey) -> str:
-    """The value of a key, with the default where it has another."""
-    changed = key.value and key.value != key.default != "must be given"
-    return f"{key.value} (default {key.default})" if changed else key.value or key.default
-
-
-def _meaning(key: SceneKey) -> str:
-    return key.meaning if key.cost == "none" else f"{key.meaning} Cost: {key.cost}."
 
 
 def _print_one(console: Console, key: SceneKey) -> None:
