@@ -16,7 +16,6 @@ import numpy as np
 from upd.labels import counted, listed, number, sentence, unit_label
 from upd.plot import sweep_charts as charts
 from upd.plot.answer_table import AnswerTable
-from upd.plot.chart import Chart
 from upd.report.folder import read_json
 from upd.report.page import Section, Verdict, page_text, versions_text, write_page
 from upd.report.tables import filled, sample_table, stage_table, with_unit
@@ -95,7 +94,13 @@ def write_sweep_report(folder: Path) -> Path:
 
 def sweep_sections(sweep: SweepFolder) -> list[Section]:
     """The page of a sweep."""
-    drawn, cost = _charts(sweep), sweep.data["cost"]
+    if sweep.sampled:
+        drawn = charts.sample_charts(sweep.sampled, [c.values for c in sweep.columns])
+    else:
+        varied = [p.short for p in sweep.axes if len(p.values) > 1]
+        over = f"Followed numbers over {' and '.join(varied)}"
+        drawn = [replace(c, heading=over) for c in charts.sweep_charts(sweep.axes, sweep.columns)]
+    cost = sweep.data["cost"]
     seconds = [p["seconds"] for p in sweep.points] or [0.0]
     total, memory = math.fsum(seconds), cost.get("peak_rss_mb", 0.0)
     each = f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s)"
@@ -150,17 +155,6 @@ def _grid(sweep: SweepFolder) -> Section:
         )
     notes = map(sentence, sweep.data["plan"].get("notes", []))
     return Section(heading, [filled(heading, columns)], texts=[text, *notes])
-
-
-def _charts(sweep: SweepFolder) -> list[Chart]:
-    """Charts of a sample or of a grid."""
-    if sweep.sampled:
-        return charts.sample_charts(sweep.sampled, [c.values for c in sweep.columns])
-    varied = [p.short for p in sweep.axes if len(p.values) > 1]
-    over = f"Followed numbers over {' and '.join(varied)}"
-    return [
-        replace(chart, heading=over) for chart in charts.sweep_charts(sweep.axes, sweep.columns)
-    ]
 
 
 def verdict(points: Sequence[Mapping[str, Any]]) -> Verdict:
