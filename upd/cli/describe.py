@@ -27,6 +27,7 @@ from upd.scene.keys import (
     scene_to_start_from,
 )
 from upd.scene.quantities import is_name
+from upd.units import UNITS
 
 #: what an input may carry beside its value
 UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
@@ -70,7 +71,8 @@ def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: st
 
 def _print_one(console: Console, key: SceneKey) -> None:
     """One key in full."""
-    others = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
+    units = [unit for unit in UNITS.get(key.kind, {}) if unit]
+    others = f"; understood: {', '.join(units)}" if len(units) > 1 else ""
     texts = {
         "meaning": key.meaning,
         "value": f"{key.value}{'' if key.given else ' (default)'}" if key.value else "",

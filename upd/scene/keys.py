@@ -100,11 +100,6 @@ class SceneKey:
         return unit_inside(self.kind) if self.kind in UNITS else self.kind
 
     @property
-    def units(self) -> tuple[str, ...]:
-        """All that are understood."""
-        return tuple(u for u in UNITS.get(self.kind, {}) if u)
-
-    @property
     def path(self) -> str:
         """In the file, with its tables: "contact.friction"."""
         return ".".join(self.steps)

@@ -31,7 +31,7 @@ from upd.scene.modal import ModalScene
 from upd.scene.quantities import Note, hint_at, hints, must_be_given, path_of, without_notes
 from upd.scene.seated import SEATED, SeatedScene
 from upd.scene.toml import plain, read_overrides, toml_value
-from upd.scene.uncertain import taken_out, uncertainties
+from upd.scene.uncertain import Band, taken_out, uncertainties
 from upd.units import parse_quantity
 
 AnyScene = Scene | ModalScene | ForcedScene | SeatedScene | BladedDiskScene
@@ -123,7 +123,8 @@ def _loaded(
     problems += _apply(data, pairs)
     _make_absolute(data, Path.cwd())
     note_files(data)
-    data, bands = taken_out(data)
+    bands: list[Band] = []
+    data = taken_out(data, bands)
     scene, more = _validate(data)
     problems += more
     if scene is not None and bands:
