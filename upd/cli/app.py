@@ -109,8 +109,7 @@ def run(
             terminal.errors.print(f"The log and what converged are in {error.folder}")
         if error.folder is None or error.result is None:
             raise
-        lines = error.result.answer(terminal.console.width, full=full)
-        print_lines(terminal.console, lines)
+        print_lines(terminal.console, error.result.answer(terminal.console.width, full=full))
         if report and not (error.folder / "report.html").exists():
             terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
         raise

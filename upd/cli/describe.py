@@ -53,18 +53,15 @@ def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: st
         _print_one(console, chosen[0])
         return
     console.print(Text(title, "bold"))
-    for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
+    for place, mine in groupby(chosen, key=lambda k: ".".join(k.steps[:-1])):
         heads = ("key", "value", "unit", "bounds", "what it is")
         rows = []
         for key in mine:
-            value, meaning = key.value or key.default, key.meaning
-            if key.value and key.value != key.default != "must be given":
-                value += f" (default {key.default})"
-            if key.cost != "none":
-                meaning += f" Cost: {key.cost}."
-            rows.append((key.name, value, key.unit, key.bounds, meaning))
-        heading = f"[{'.'.join(steps)}]" if steps else ""
-        print_table(console, AnswerTable(heading, heads, tuple(rows)))
+            changed = key.value and key.value != key.default != "must be given"
+            value = f"{key.value} (default {key.default})" if changed else key.value or key.default
+            cost = "" if key.cost == "none" else f" Cost: {key.cost}."
+            rows.append((key.name, value, key.unit, key.bounds, key.meaning + cost))
+        print_table(console, AnswerTable(f"[{place}]" if place else "", heads, tuple(rows)))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
     console.print(Text(f"A key in full: {example}.", "dim"))
 
@@ -84,9 +81,8 @@ def _print_one(console: Console, key: SceneKey) -> None:
     }
     console.print(Text(key.path, "bold"))
     for head, text in texts.items():
-        for line in wrap(
-            text, console.width, initial_indent=f"{head:13}", subsequent_indent=" " * 13
-        ):
+        lines = wrap(text, console.width, initial_indent=f"{head:13}", subsequent_indent=" " * 13)
+        for line in lines:
             console.print(Text(line))
 
 

@@ -39,7 +39,6 @@ class SweepFolder:
     with values, status, reason, warnings and seconds.
     """
 
-    path: Path
     data: Mapping[str, Any]
     axes: tuple[charts.Parameter, ...]
     points: list[dict[str, Any]]
@@ -72,7 +71,7 @@ def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json. Raises InputError when it is missing or damaged."""
     found = read_json(folder / "sweep.json", _KEYS, "sweep")
     axes = [charts.Parameter(one["path"], tuple(one["values"])) for one in found["axes"]]
-    return SweepFolder(folder, found, charts.told_apart(axes), found["points"])
+    return SweepFolder(found, charts.told_apart(axes), found["points"])
 
 
 def write_sweep_report(folder: Path) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from upd.results.case import Case
@@ -207,8 +208,15 @@ def read_result(data: Mapping[str, Any]) -> Result:
     )
 
 
-def with_estimates(results: Iterable[Result], estimates: Estimates) -> tuple[Result, ...]:
-    """The numbers with the parts of their errors; those that have some keep their own."""
-    return tuple(
-        r if r.parts else with_parts(r, estimates.get((r.name, r.case), ())) for r in results
-    )
+def with_estimates(
+    results: Iterable[Result], estimates: Estimates, inputs: InputParts = MappingProxyType({})
+) -> tuple[Result, ...]:
+    """The numbers with the parts of their errors, those that have some with their own, and with
+    what the inputs known within limits do to them.
+    """
+    out = []
+    for one in results:
+        key = one.name, one.case
+        found = one if one.parts else with_parts(one, estimates.get(key, ()))
+        out.append(found if one.withheld else replace(found, inputs=inputs.get(key, one.inputs)))
+    return tuple(out)
