@@ -53,10 +53,17 @@ class Stages:
         """Seconds per stage, their total by the clock, and the largest resident memory in MB since
         `forget_peak`.
         """
+        try:
+            lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+            (peak,) = (line.split()[1] for line in lines if line.startswith("VmHWM"))
+            memory = int(peak) * 1024 / 1e6
+        except (OSError, ValueError):
+            size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            memory = size / 1e6 if sys.platform == "darwin" else size / 1e3
         return {
             "stages": {k: round(v, 4) for k, v in self.seconds.items()},
             "total_s": round(self.elapsed(), 4),
-            "peak_rss_mb": round(_peak_mb(), 1),
+            "peak_rss_mb": round(memory, 1),
         }
 
 
@@ -66,13 +73,3 @@ def forget_peak() -> None:
     """
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
-
-
-def _peak_mb() -> float:
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-        (peak,) = (line.split()[1] for line in lines if line.startswith("VmHWM"))
-        return int(peak) * 1024 / 1e6
-    except (OSError, ValueError):
-        size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return size / 1e6 if sys.platform == "darwin" else size / 1e3

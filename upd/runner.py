@@ -26,7 +26,7 @@ from upd.report.notebook import RunResult, write_curves, write_figures
 from upd.results import Check, Estimates, Result, write_netcdf
 from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
 from upd.results.netcdf import DIGEST, file_digest
-from upd.results.number import with_estimates, with_inputs
+from upd.results.number import InputParts, with_estimates
 from upd.scene import AnyScene, as_scene
 from upd.scene.keys import scene_as_run
 from upd.vary.inputs import input_parts
@@ -194,12 +194,13 @@ def _collected(
         arrays = analysis.arrays(solution) if solution is not None else {}
         made = analysis.make_results(solution) if solution is not None else ()
     results = tuple(map(_reached, made))
-    if estimates is not None:
-        results = with_estimates(results, estimates)
-    else:
+    errors: Estimates = estimates or {}
+    inputs: InputParts = {}
+    if estimates is None:
         if solution.plan.scene.estimates:
-            results = with_estimates(results, analysis.estimate(solution, results, stages))
-        results = with_inputs(results, input_parts(analysis, solution, results, stages))
+            errors = analysis.estimate(solution, results, stages)
+        inputs = input_parts(analysis, solution, results, stages)
+    results = with_estimates(results, errors, inputs)
     return RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,

@@ -91,7 +91,7 @@ def run(
     full
         Print every number, effect and self-check, and the seconds of each stage.
     """
-    from upd.cli.tables import print_result
+    from upd.cli.tables import print_lines
     from upd.runner import run as run_scene
 
     loaded = _loaded(scene, set)
@@ -109,12 +109,13 @@ def run(
             terminal.errors.print(f"The log and what converged are in {error.folder}")
         if error.folder is None or error.result is None:
             raise
-        print_result(terminal.console, error.result, full=full)
+        print_lines(terminal.console, error.result.answer(terminal.console.width, full=full))
         if report and not (error.folder / "report.html").exists():
             terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
         raise
     # faults of pictures are printed once, beside the answer
-    print_result(terminal.console, replace(result, faults=()), full=full)
+    shown = replace(result, faults=())
+    print_lines(terminal.console, shown.answer(terminal.console.width, full=full))
     for fault in result.faults:
         warn(fault, "yellow")
 
@@ -417,7 +418,8 @@ def report(runs: list[Path], *, out: Path | None = None) -> None:
     out
         File of the comparison; by default comparison.html beside the first run folder.
     """
-    from upd.report import write_comparison, write_report
+    from upd.report import write_report
+    from upd.report.run_page import write_comparison
 
     if len(runs) == 1:
         if out is not None:

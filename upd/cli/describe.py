@@ -21,13 +21,13 @@ from upd.plot.answer_table import AnswerTable
 from upd.scene import load_scene
 from upd.scene.keys import (
     SceneKey,
-    absent_keys,
     chosen_keys,
     recipe_keys,
     scene_keys,
     scene_to_start_from,
 )
 from upd.scene.quantities import is_name
+from upd.units import UNITS
 
 #: what an input may carry beside its value
 UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
@@ -43,7 +43,7 @@ def described(what: str, overrides: Sequence[str] = ()) -> tuple[str, list[Scene
         return f"Recipe {what}", recipe_keys(what)
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return title, scene_keys(scene) + absent_keys(scene)
+    return title, scene_keys(scene, absent=True)
 
 
 def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: str) -> None:
@@ -53,27 +53,23 @@ def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: st
         _print_one(console, chosen[0])
         return
     console.print(Text(title, "bold"))
-    for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
+    for place, mine in groupby(chosen, key=lambda k: ".".join(k.steps[:-1])):
         heads = ("key", "value", "unit", "bounds", "what it is")
-        rows = tuple((k.name, _value(k), k.unit, k.bounds, _meaning(k)) for k in mine)
-        print_table(console, AnswerTable(f"[{'.'.join(steps)}]" if steps else "", heads, rows))
+        rows = []
+        for key in mine:
+            changed = key.value and key.value != key.default != "must be given"
+            value = f"{key.value} (default {key.default})" if changed else key.value or key.default
+            cost = "" if key.cost == "none" else f" Cost: {key.cost}."
+            rows.append((key.name, value, key.unit, key.bounds, key.meaning + cost))
+        print_table(console, AnswerTable(f"[{place}]" if place else "", heads, tuple(rows)))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
     console.print(Text(f"A key in full: {example}.", "dim"))
 
 
-def _value(key: SceneKey) -> str:
-    """The value of a key, with the default where it has another."""
-    changed = key.value and key.value != key.default != "must be given"
-    return f"{key.value} (default {key.default})" if changed else key.value or key.default
-
-
-def _meaning(key: SceneKey) -> str:
-    return key.meaning if key.cost == "none" else f"{key.meaning} Cost: {key.cost}."
-
-
 def _print_one(console: Console, key: SceneKey) -> None:
     """One key in full."""
-    others = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
+    units = [unit for unit in UNITS.get(key.kind, {}) if unit]
+    others = f"; understood: {', '.join(units)}" if len(units) > 1 else ""
     texts = {
         "meaning": key.meaning,
         "value": f"{key.value}{'' if key.given else ' (default)'}" if key.value else "",
@@ -85,9 +81,8 @@ def _print_one(console: Console, key: SceneKey) -> None:
     }
     console.print(Text(key.path, "bold"))
     for head, text in texts.items():
-        for line in wrap(
-            text, console.width, initial_indent=f"{head:13}", subsequent_indent=" " * 13
-        ):
+        lines = wrap(text, console.width, initial_indent=f"{head:13}", subsequent_indent=" " * 13)
+        for line in lines:
             console.print(Text(line))
 
 

@@ -13,29 +13,24 @@ from upd.analyses.cost import memory_limit
 from upd.labels import counted
 from upd.plot.answer_table import AnswerTable
 from upd.report.answer import TITLE, AnswerLine, table_lines
-from upd.report.notebook import RunResult
 from upd.results.check import FAILED, OK, WARNED
 
 #: mood of a line -> how it looks
 _STYLES = {OK: "green", WARNED: "yellow", FAILED: "red", TITLE: "bold"}
 
 
-def print_result(console: Console, result: RunResult, *, full: bool = False) -> None:
-    """Print the answer of a run; with all numbers, checks and sources of errors when ``full``."""
-    _print_lines(console, result.answer(console.width, full=full))
+def print_lines(console: Console, lines: Iterable[AnswerLine]) -> None:
+    """Print an answer, each line as its mood looks."""
+    for text, mood in lines:
+        # a path longer than the terminal is wide stays one line, to be copied
+        console.print(Text(text, style=_STYLES.get(mood, "")), soft_wrap=True)
 
 
 def print_table(console: Console, table: AnswerTable, *, cut: bool = False) -> None:
     """Print a table with its heading and its note, as wide as the console; where it may be ``cut``,
     without the last columns that find no room.
     """
-    _print_lines(console, table_lines(table, console.width, cut=cut))
-
-
-def _print_lines(console: Console, lines: Iterable[AnswerLine]) -> None:
-    for text, mood in lines:
-        # a path longer than the terminal is wide stays one line, to be copied
-        console.print(Text(text, style=_STYLES.get(mood, "")), soft_wrap=True)
+    print_lines(console, table_lines(table, console.width, cut=cut))
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from upd.cli.app import command_table
 from upd.mesh.recipe_modules import READY
 from upd.scene import load_scene
-from upd.scene.keys import SceneKey, absent_keys, recipe_keys, scene_keys
+from upd.scene.keys import SceneKey, recipe_keys, scene_keys
 
 MARKED = str.maketrans({"*": "\\*", "<": "&lt;", "$": "\\$"})
 HERE = Path(__file__).resolve().parent
@@ -33,7 +33,7 @@ def main() -> int:
     shutil.copytree(HERE.parent / "scenes" / "examples", source / "_examples")
     for what in SCENES:
         scene = load_scene(what)
-        keys = [k for k in (*scene_keys(scene), *absent_keys(scene)) if k.steps[0] != "geometry"]
+        keys = [k for k in scene_keys(scene, absent=True) if k.steps[0] != "geometry"]
         title = f"Keys of a {scene.analysis} (`{what}`)"
         write(source / f"reference/scene_{what}.md", page(title, keys))
     for recipe in READY:

@@ -24,7 +24,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from upd.cache.files import whole_file
 from upd.plot import style
-from upd.plot.chart import MOST_PANELS, Area, Axis, Band, Chart, Map, Trace
+from upd.plot.chart import MOST_PANELS, Area, Axis, Band, Chart, Trace
 
 Drawing = Callable[[Axes], Any]
 
@@ -77,7 +77,10 @@ _BESIDE, _ABOVE = 1.05, 2.0
 def draw(chart: Chart, ax: Axes) -> Axes:
     """Draw a chart on matplotlib axes; returns them."""
     chart = style.with_room(chart)
-    _grid(chart, ax)
+    ax.tick_params(labelsize=_LETTERS)
+    if not chart.maps:
+        ax.grid(visible=True, which="major", color="#dddddd", lw=0.6)
+        ax.set_axisbelow(True)
     _draw_maps(chart, ax)
     for area in chart.areas:
         _draw_area(area, ax)
@@ -152,19 +155,12 @@ def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
     return draw_sheet(drawings, first.columns, (wide, tall), dpi)
 
 
-def _grid(chart: Chart, ax: Axes) -> None:
-    ax.tick_params(labelsize=_LETTERS)
-    if not chart.maps:
-        ax.grid(visible=True, which="major", color="#dddddd", lw=0.6)
-        ax.set_axisbelow(True)
-
-
 def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     """Scale, ticks and ends of one axis."""
     which = ax.xaxis if name == "x" else ax.yaxis
     values = style.coordinates(chart, name)
     limits = getattr(ax, f"set_{name}lim")
-    if style.is_log(axis, values):
+    if style.is_log(chart, name):
         getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
         seen = values[values > 0.0]
         few = seen.max() < _FEW_DECADES * seen.min()
@@ -250,7 +246,7 @@ def _draw_band(band: Band, ax: Axes) -> None:
     """What lies between two values of one axis, or a line at one."""
     line, span = (ax.axvline, ax.axvspan) if band.axis == "x" else (ax.axhline, ax.axhspan)
     look: dict[str, Any] = {
-        "color": style.band_colour(band),
+        "color": style.colour_of(band),
         "label": style.plain(band.label) or None,
     }
     if band.dashed:
@@ -272,7 +268,7 @@ def _draw_area(area: Area, ax: Axes) -> None:
         area.x,
         area.low,
         area.high,
-        color=style.area_colour(area),
+        color=style.colour_of(area),
         lw=0.0,
         label=style.plain(area.label) or None,
         **look,
@@ -303,28 +299,24 @@ def _draw_scatters(chart: Chart, ax: Axes) -> None:
 
 
 def _draw_maps(chart: Chart, ax: Axes) -> None:
-    """Maps with the colour bar they share."""
+    """Maps, a cell for every value, with the colour bar they share."""
     low, high = style.colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
-        drawn = _cells(m, low, high, ax)
+        look: dict[str, Any] = {"cmap": "viridis", "vmin": low, "vmax": high}
+        if m.states:
+            ends = {"vmin": -0.5, "vmax": len(m.states) - 0.5}
+            look = {"cmap": ListedColormap(style.state_colours(m))} | ends
+            if max(m.z.shape) <= _FEW_CELLS:
+                # Between many cells the lines would take more room than the cells.
+                look |= {"edgecolors": "w", "lw": 0.2}
+        z = np.ma.masked_invalid(m.z.T)
+        drawn = ax.pcolormesh(m.x, m.y, z, shading="nearest", **look)
         # Axes for a colour bar cost as much as the map: states of a compact map stand in the
         # legend. One value everywhere has no scale.
         if k == 0 and (style.is_wide(chart) if m.states else low < high):
             bar = _bar(drawn, chart, m.value, ax)
             if m.states:
                 bar.set_ticks(list(range(len(m.states))), labels=[style.plain(s) for s in m.states])
-
-
-def _cells(m: Map, low: float, high: float, ax: Axes) -> Any:
-    """A cell for every value of a map."""
-    look: dict[str, Any] = {"cmap": "viridis", "vmin": low, "vmax": high}
-    if m.states:
-        ends = {"vmin": -0.5, "vmax": len(m.states) - 0.5}
-        look = {"cmap": ListedColormap(style.state_colours(m))} | ends
-        if max(m.z.shape) <= _FEW_CELLS:
-            # Between many cells the lines would take more room than the cells.
-            look |= {"edgecolors": "w", "lw": 0.2}
-    return ax.pcolormesh(m.x, m.y, np.ma.masked_invalid(m.z.T), shading="nearest", **look)
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:

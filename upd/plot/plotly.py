@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from html import escape
 from textwrap import wrap
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +57,8 @@ def figure(chart: Chart) -> dict[str, Any]:
         trace["showlegend"] = trace["name"] in names
         names.discard(trace["name"])
     layout: dict[str, Any] = {
-        "xaxis": _axis(chart, chart.x, style.coordinates(chart, "x")),
-        "yaxis": _axis(chart, chart.y, style.coordinates(chart, "y"), _LINE),
+        "xaxis": _axis(chart, "x"),
+        "yaxis": _axis(chart, "y", _LINE),
         "hovermode": "closest",
         "showlegend": any(trace["showlegend"] for trace in data),
         "shapes": [shape for band in chart.bands for shape in _band(band)],
@@ -71,9 +71,10 @@ def figure(chart: Chart) -> dict[str, Any]:
     return {"data": data, "layout": layout, "wide": wide}
 
 
-def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:
+def _axis(chart: Chart, which: Literal["x", "y"], letters: int = 1000) -> dict[str, Any]:
     """One axis; its name is broken into lines of so many ``letters``."""
-    grid = not chart.maps
+    axis: Axis = getattr(chart, which)
+    log, grid = style.is_log(chart, which), not chart.maps
     out: dict[str, Any] = {
         "title": {"text": "<br>".join(escape(line) for line in wrap(axis.label, letters))},
         "showgrid": grid,
@@ -81,7 +82,6 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         "zeroline": False,
         "automargin": True,
     }
-    log = style.is_log(axis, values)
     if log:
         out["type"] = "log"
     if axis.ticks:
@@ -93,7 +93,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = _range(axis, values, log)
+        out["range"] = _range(axis, style.coordinates(chart, which), log)
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -226,7 +226,7 @@ def _marks(chart: Chart) -> Iterator[dict[str, Any]]:
 
 def _band(b: Band) -> list[dict[str, Any]]:
     """Dashed lines at its ends, a wide pale line, or a pale span."""
-    other, colour = "y" if b.axis == "x" else "x", style.band_colour(b)
+    other, colour = "y" if b.axis == "x" else "x", style.colour_of(b)
     shared: dict[str, Any] = {"layer": "below", f"{b.axis}ref": b.axis, f"{other}ref": "paper"}
     shared |= {f"{other}0": 0, f"{other}1": 1}
     if b.low != b.high and not b.dashed:
@@ -242,7 +242,7 @@ def _band(b: Band) -> list[dict[str, Any]]:
 
 def _band_entry(b: Band) -> dict[str, Any]:
     """The legend entry of a band, which also makes the axis reach to it."""
-    colour = style.band_colour(b)
+    colour = style.colour_of(b)
     line = {"color": colour, "width": 1.2, "dash": "dash"}
     if not b.dashed:
         line = {"color": _pale(colour, 0.35), "width": 8}
@@ -257,7 +257,7 @@ def _pale(colour: str, alpha: float) -> str:
 
 def _area(chart: Chart, a: Area) -> Iterator[dict[str, Any]]:
     """The lower curve, unseen, and the upper one filled down to it, its width at the pointer."""
-    colour, name = style.area_colour(a), escape(a.label)
+    colour, name = style.colour_of(a), escape(a.label)
     width = _value(Axis(a.label or "width", chart.y.unit), "customdata")
     x = _hover(chart).partition("<br>")[0]
     yield _scatter(a.x, a.low, "lines", line={"width": 0}, hoverinfo="skip")
@@ -306,25 +306,21 @@ def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
     out: dict[str, Any] = {"type": "heatmap", "name": "", "hoverongaps": False}
     out |= {"x": _numbers(m.x), "y": _numbers(m.y), "z": _numbers(m.z.T)}
     if m.states:
-        return out | _states(chart, m)
+        n, colours, known = len(m.states), style.state_colours(m), np.isfinite(m.z.T)
+        names = np.array([escape(state) for state in m.states], object)
+        steps = [[(k + end) / n, colour] for k, colour in enumerate(colours) for end in (0, 1)]
+        bar = {"orientation": "h", "thickness": 12, "tickvals": list(range(n))}
+        return out | {
+            "zmin": -0.5,
+            "zmax": n - 0.5,
+            "colorscale": steps,
+            "colorbar": bar | {"ticktext": names.tolist()},
+            "xgap": 0.5,
+            "ygap": 0.5,
+            "text": np.where(known, names[np.where(known, m.z.T, 0.0).astype(int)], "").tolist(),
+            "hovertemplate": _hover(chart, "%{text}"),
+        }
     scale = _scale(m.value, low, high)
     out |= {"zmin": scale.pop("cmin"), "zmax": scale.pop("cmax"), **scale}
     out["hovertemplate"] = _hover(chart, _value(m.value, "z"))
     return out
-
-
-def _states(chart: Chart, m: Map) -> dict[str, Any]:
-    n, colours, known = len(m.states), style.state_colours(m), np.isfinite(m.z.T)
-    names = np.array([escape(state) for state in m.states], object)
-    steps = [[(k + end) / n, colour] for k, colour in enumerate(colours) for end in (0, 1)]
-    bar = {"orientation": "h", "thickness": 12, "tickvals": list(range(n))}
-    return {
-        "zmin": -0.5,
-        "zmax": n - 0.5,
-        "colorscale": steps,
-        "colorbar": bar | {"ticktext": names.tolist()},
-        "xgap": 0.5,
-        "ygap": 0.5,
-        "text": np.where(known, names[np.where(known, m.z.T, 0.0).astype(int)], "").tolist(),
-        "hovertemplate": _hover(chart, "%{text}"),
-    }

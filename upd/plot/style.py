@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
+from upd.plot.chart import Area, Array, Band, Chart, Map, Mark, Scatter, Trace
 
 #: colours of curves: dark enough on white, different to colour-blind eyes too (Okabe and Ito 2008)
 COLOURS = ("#1f5fa8", "#c1561a", "#2a8a68", "#a24b8f", "#6b6b6b", "#b38600", "#3fa0d0", "#8c2d2d")
@@ -32,28 +32,24 @@ _SMALL, _LARGE, _FEW_POINTS = (40.0, 220.0), (110.0, 600.0), 40
 _WIDE, _LINE = 0.19, 0.09
 
 
-def colour_of(part: Trace | Mark) -> str:
-    """Colour of a curve or a mark: black outlines, grey closed forms, else that of its number."""
+def colour_of(part: Trace | Mark | Area | Band) -> str:
+    """Colour of a part of a chart: black outlines, grey closed forms, contact states and bands
+    without a number (measurements; dashed: limits) their own, else that of its number.
+    """
     if isinstance(part, Trace) and part.outline:
         return OUTLINE
-    return CLOSED if part.closed else COLOURS[part.colour % len(COLOURS)]
+    if isinstance(part, (Trace, Mark)) and part.closed:
+        return CLOSED
+    if isinstance(part, Area) and part.state in SHARE_COLOURS:
+        return SHARE_COLOURS[part.state]
+    if isinstance(part, Band) and part.colour < 0:
+        return LIMIT if part.dashed else MEASURED
+    return COLOURS[part.colour % len(COLOURS)]
 
 
 def state_colours(m: Map) -> list[str]:
     """Colours of the states of a map, in their order."""
     return [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
-
-
-def band_colour(band: Band) -> str:
-    """Colour of a band; without a number that of measurements, dashed that of limits."""
-    if band.colour >= 0:
-        return COLOURS[band.colour % len(COLOURS)]
-    return LIMIT if band.dashed else MEASURED
-
-
-def area_colour(area: Area) -> str:
-    """Colour of an area; of a contact state its own."""
-    return SHARE_COLOURS.get(area.state) or COLOURS[area.colour % len(COLOURS)]
 
 
 def plain(text: str) -> str:
@@ -88,9 +84,9 @@ def is_wide(chart: Chart) -> bool:
     return chart.equal and 0.0 < proportion(chart) < 1.0 / _WIDE_MAP
 
 
-def is_log(axis: Axis, values: Array) -> bool:
+def is_log(chart: Chart, name: Literal["x", "y"]) -> bool:
     """Whether an axis is drawn logarithmic: not without a positive value."""
-    return axis.log and bool((values > 0.0).any())
+    return bool(getattr(chart, name).log and (coordinates(chart, name) > 0.0).any())
 
 
 def colour_range(parts: Iterable[Map | Scatter]) -> tuple[float, float]:
@@ -165,7 +161,7 @@ def with_room(chart: Chart) -> Chart:
     # where the part of the height above a mark is that of its words
     ends = _parts(chart, "y")[shown] / (1.0 - _heights(chart)[shown])
     end = low + (high - low) * max(1.0, float(ends.max()))
-    return replace(chart, y=replace(chart.y, high=10.0**end if _log(chart, "y") else end))
+    return replace(chart, y=replace(chart.y, high=10.0**end if is_log(chart, "y") else end))
 
 
 def _heights(chart: Chart) -> Array:
@@ -173,13 +169,9 @@ def _heights(chart: Chart) -> Array:
     return np.array([_LINE * (1 + mark.text.count("\n")) for mark in chart.marks])
 
 
-def _log(chart: Chart, name: Literal["x", "y"]) -> bool:
-    return is_log(getattr(chart, name), coordinates(chart, name))
-
-
 def _ends(chart: Chart, name: Literal["x", "y"]) -> tuple[float, float]:
     """Ends of an axis: those it is given, else those of the data; logarithms on such an axis."""
-    axis, values, log = getattr(chart, name), coordinates(chart, name), _log(chart, name)
+    axis, values, log = getattr(chart, name), coordinates(chart, name), is_log(chart, name)
     values = values[values > 0.0] if log else values
     low = values.min() if axis.low is None else axis.low
     high = values.max() if axis.high is None else axis.high
@@ -192,6 +184,6 @@ def _parts(chart: Chart, name: Literal["x", "y"]) -> Array:
     if not at.size:
         return at
     low, high = _ends(chart, name)
-    if _log(chart, name):
+    if is_log(chart, name):
         at = np.log10(at, out=np.full(len(at), np.nan), where=at > 0.0)
     return np.asarray((at - low) / (high - low or 1.0))

@@ -115,12 +115,12 @@ def _fields(
     place = {case: k for k, case in enumerate(moved)}
     fields = []
     for case, values in pressures.items():
-        field = _field(f"pressure, {_load(case)}", "pressure", "MPa", values, bodies)
+        field = _field(f"pressure, F={case.removesuffix('N')} N", "pressure", "MPa", values, bodies)
         moves = {"motion": place.get(case), "largest_mm": largest.get(case, 0.0)}
         fields.append(field | moves)
     for case, (label, u) in moved.items():
         length = np.linalg.norm(u, axis=1) * (1.0 / (largest[case] or 1.0) if label else 1e3)
-        title = label or f"displacement, {_load(case)}"
+        title = label or f"displacement, F={case.removesuffix('N')} N"
         field = _field(title, "displacement", "" if label else "µm", length, bodies)
         moves = {"motion": place[case], "largest_mm": 0.0 if label else largest[case]}
         fields.append(field | moves)
@@ -132,10 +132,6 @@ def _fields(
         for case, (_, u) in moved.items()
     ]
     return fields, motions
-
-
-def _load(case: str) -> str:
-    return f"F={case.removesuffix('N')} N"
 
 
 def _field(

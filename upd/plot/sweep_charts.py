@@ -97,14 +97,11 @@ class Parameter:
 
 def told_apart(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """The parameters, each with as many last words of its path as no other has."""
-
-    paths = [p.path.split(".") for p in parameters]
-
-    def words(path: list[str]) -> int:
+    paths, out = [p.path.split(".") for p in parameters], []
+    for parameter, path in zip(parameters, paths, strict=True):
         own = (n for n in range(1, len(path)) if [one[-n:] for one in paths].count(path[-n:]) == 1)
-        return next(own, len(path))
-
-    return tuple(replace(p, words=words(path)) for p, path in zip(parameters, paths, strict=True))
+        out.append(replace(parameter, words=next(own, len(path))))
+    return tuple(out)
 
 
 @dataclass(frozen=True)

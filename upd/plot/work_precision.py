@@ -43,25 +43,24 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
         memory. The first three numbers over seconds, with their last case (the largest load), come
         first and are on the sheet ``work_precision``; of a forced response, those with friction.
     """
-    groups = _groups(curves)
-    shown = _shown(list(groups))
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for curve in curves:
+        groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
+    # a number that no level moves has no error to show
+    groups = {
+        key: group
+        for key, group in groups.items()
+        if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)
+    }
+    # of a forced response the curves with friction are what is studied
+    friction = [key for key in groups if _FRICTION in key[1]]
+    last = {name: (name, case) for name, case in friction or groups}
+    shown = list(last.values())[:_NUMBERS]
     return [
         _chart(group, cost, axis, sheet=key in shown and cost == "seconds", columns=_NUMBERS)
         for key, group in sorted(groups.items(), key=lambda item: item[0] not in shown)
         for cost, axis in _COSTS
     ]
-
-
-def _groups(curves: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
-    """Curves of every number and case; a number that no level moves has no error to show."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for curve in curves:
-        groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
-    return {
-        key: group
-        for key, group in groups.items()
-        if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)
-    }
 
 
 def _around(axis: Axis, values: Sequence[Array], room: float = 0.0) -> Axis:
@@ -71,14 +70,6 @@ def _around(axis: Axis, values: Sequence[Array], room: float = 0.0) -> Axis:
     logs = np.log10(np.concatenate(values))
     low, high = np.floor(logs.min()), np.ceil(logs.max() + room)
     return replace(axis, low=10.0**low, high=10.0 ** max(high, low + 1.0))
-
-
-def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
-    """Numbers and cases on the sheet."""
-    # of a forced response the curves with friction are what is studied
-    friction = [key for key in keys if _FRICTION in key[1]]
-    last = {name: (name, case) for name, case in friction or keys}
-    return set(list(last.values())[:_NUMBERS])
 
 
 def _chart(

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
@@ -96,24 +96,22 @@ def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[An
 
 
 def _verdict(summary: Mapping[str, Any], width: int) -> list[AnswerLine]:
-    """Name, outcome and the number that matters most; why when the run failed."""
+    """Name, outcome and the number that matters most with its reference, or the case of one
+    without; why when the run failed.
+    """
     outcome = outcome_of(summary["status"])
     text = f"{summary['scene']}: {summary['status'] if outcome == FAILED else outcome}"
     main = None if outcome == FAILED else _most_important(summary)
     if main is not None:
         text += f" - {number_label(main['name'])} {shown(main)} {plus_minus(main)}".rstrip()
-        whole = f"{text} {_beside(main)}".rstrip()
+        beside = [main["case"]]
+        if main["reference"] is not None:
+            reference = f"{main['source']} {number(main['reference'])}".strip()
+            beside = [reference, percent(main["error"])]
+        whole = f"{text} ({', '.join(filter(None, beside))})" if any(beside) else text
         text = whole if len(whole) <= width else text
     title = summary["title"] if summary["title"] != summary["scene"] else ""
     return [*_wrapped(text, width, outcome), *_wrapped(title, width)]
-
-
-def _beside(entry: Entry) -> str:
-    """The reference of a number with its source, or the case of one without."""
-    if entry["reference"] is None:
-        return f"({entry['case']})" if entry["case"] else ""
-    parts = (f"{entry['source']} {number(entry['reference'])}".strip(), percent(entry["error"]))
-    return f"({', '.join(filter(None, parts))})"
 
 
 def _most_important(summary: Mapping[str, Any]) -> Entry | None:
@@ -136,7 +134,10 @@ def _end(
 ) -> list[AnswerLine]:
     """Chosen levels, sources of the main error, checks, cost and files; at last what warns."""
     lines = [("", "")]
-    for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary)):
+    # what a run that chose its levels raised, what it did not need, and what it spared
+    mine = (e for e in summary["effects"] if e["name"] in CHOSEN_BY_ACCURACY)
+    reached = [f"Accuracy reached, {e['why'].partition('; rounds:')[0]}" for e in mine][:1]
+    for text in (*reached, _budget(summary), checked(summary), _cost(summary)):
         lines += _wrapped(text, width)
     has_page = folder is not None and (folder / "report.html").is_file()
     if folder is not None:
@@ -153,12 +154,6 @@ def _end(
         where = "on the page" if has_page else "printed by --full"
         lines.append((f"Warnings besides: {more}, {where}.", WARNED))
     return lines
-
-
-def _accuracy(summary: Mapping[str, Any]) -> str:
-    """What a run that chose its levels raised, what it did not need, and what it spared."""
-    mine = (e for e in summary["effects"] if e["name"] in CHOSEN_BY_ACCURACY)
-    return next((f"Accuracy reached, {e['why'].partition('; rounds:')[0]}" for e in mine), "")
 
 
 def _budget(summary: Mapping[str, Any]) -> str:
@@ -217,11 +212,15 @@ class FigureAnswer(ABC):
 
     Attributes
     ----------
+    figure : str
+        Name of the figure, without ending.
     source : AnyScene
         The scene that the question was about.
     folder : Path, optional
         Where its files lie; None when nothing was written.
     """
+
+    figure: ClassVar[str]
 
     source: AnyScene
     folder: Path | None = field(default=None, kw_only=True)
@@ -240,11 +239,6 @@ class FigureAnswer(ABC):
     @abstractmethod
     def charts(self) -> list[Chart]:
         """The charts of its figure."""
-
-    @property
-    @abstractmethod
-    def figure(self) -> str:
-        """Name of the figure, without ending."""
 
     @property
     @abstractmethod

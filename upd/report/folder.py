@@ -11,21 +11,20 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from PIL import Image
 
 from upd.cache.files import json_text
-from upd.cache.folders import plain_name
 from upd.errors import InputError, one_line
-from upd.labels import listed, sentence
+from upd.labels import listed
 from upd.results import Arrays, Group, read_netcdf
 
 _LOG_LINE = re.compile(
     r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$", re.MULTILINE
 )
-_VERSIONS = "versions: "
 #: key of a JSON file: SHA-256 of what else it has
 _DIGEST = "sha256"
 #: names of the figures a run may leave or left once, without their ending
@@ -47,6 +46,7 @@ _RUN_FILES = (
 _INNER_FILES = ("curves/*.csv", "matrices/reduced_*", *_NOBODYS)
 #: kind of values -> keys of summary.json
 _SUMMARY = {str: "scene title status", list: "effects checks results", dict: "size cost"}
+_TEXT = partial(Path.read_text, encoding="utf-8")
 Kept = TypeVar("Kept")
 
 
@@ -73,14 +73,6 @@ class RunFolder:
     scene: str
     log: tuple[re.Match[str], ...]
     missing: tuple[str, ...]
-
-    @property
-    def origin(self) -> str:
-        """Its name, when the run began and with which packages, by its log."""
-        found = (line["text"] for line in self.log if line["text"].startswith(_VERSIONS))
-        versions = sentence(next(found, ""))
-        started = f", run on {self.log[0]['time'].partition(',')[0]}" if self.log else ""
-        return f"Run folder {plain_name(self.path)}{started}. {versions}".rstrip()
 
 
 def is_run_file(entry: Path) -> bool:
@@ -123,27 +115,24 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     arrays: dict[str, Group] = part(folder / "result.nc", read_netcdf, {})
     if whole and missing and (folder / "result.nc").exists():
         raise InputError(f"{folder}/{missing[0]}")
-    scene = part(folder / "scene.toml", _toml, "")
+    none: tuple[str, dict[str, Any]] = "", {}
+    scene, scene_file = part(folder / "scene.toml", _toml, none)
     pictures = {f.stem: part(f, _picture, None) for f in sorted(folder.glob("*.png"))}
     return RunFolder(
         path=folder,
-        summary=summary | {"scene_file": tomllib.loads(scene)},
+        summary=summary | {"scene_file": scene_file},
         arrays=arrays,
         figures={name: file for name, file in pictures.items() if file is not None},
         scene=scene,
-        log=tuple(_LOG_LINE.finditer(part(folder / "run.log", _text, ""))),
+        log=tuple(_LOG_LINE.finditer(part(folder / "run.log", _TEXT, ""))),
         missing=tuple(missing),
     )
 
 
-def _text(path: Path) -> str:
-    return path.read_text("utf-8")
-
-
-def _toml(path: Path) -> str:
-    """Text of a TOML file. Raises ValueError where it is none."""
-    tomllib.loads(text := _text(path))
-    return text
+def _toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Text and tables of a TOML file. Raises ValueError where it is none."""
+    text = _TEXT(path)
+    return text, tomllib.loads(text)
 
 
 def _picture(path: Path) -> Path | None:

@@ -252,30 +252,23 @@ def load(folder: str | Path) -> RunResult:
 
 
 def write_figures(result: RunResult, folder: Path) -> list[Path]:
-    """Draw the charts of a run as PNG, those of one figure on one sheet.
+    """Draw the charts of a run as PNG, those of one figure on one sheet, and the recipe's sections
+    with their dimensions, unless its meshes cannot be made.
 
-    Figures that lie there already stay. Returns what was written.
+    Charts that lie there already stay. Returns what was written.
     """
     # matplotlib takes a while to import
-    from upd.plot.matplotlib import write_sheets
+    from upd.plot.drawing import draw_sections
+    from upd.plot.matplotlib import write_png, write_sheets
 
     written = write_sheets(charts(result), folder, keep=True)
-    return written + write_dimensions(result, folder / "dimensions.png")
-
-
-def write_dimensions(result: RunResult, path: Path) -> list[Path]:
-    """Draw the recipe's sections with their dimensions, unless its meshes cannot be made."""
     recipe = str(tomllib.loads(result.scene_text)["geometry"]["recipe"])
     try:
         meshes, views = recipes.drawing(recipe, result.size["mesh"])
     except UpdError as problem:
         log.info("no drawing of the geometry: %s", problem)
-        return []
-    # matplotlib takes a while to import
-    from upd.plot.drawing import draw_sections
-    from upd.plot.matplotlib import write_png
-
-    return write_png(draw_sections(meshes, views), path)
+        return written
+    return written + write_png(draw_sections(meshes, views), folder / "dimensions.png")
 
 
 def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
@@ -326,38 +319,39 @@ def as_csv(rows: Iterable[Iterable[Any]]) -> str:
 def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:
     """Dimension -> its columns, where there is something to draw over something else."""
     for dimension in dict.fromkeys(d for v in group.values() for d in v.dims):
-        columns = [one for name, v in group.items() for one in _columns(name, v, dimension)]
+        along = ((name, v, _along(v, dimension)) for name, v in group.items())
+        columns = [one for mine in along for one in _columns(*mine)]
         several = len(columns) > 1 and len(columns[0][1]) > 1
         if several and not dimension.startswith(_PEAKS):
             yield dimension, columns
     maps = {name: v for name, v in group.items() if v.dims[:2] == _PLACES}
     if maps and all(axis in group for axis in _PLACES):
         lines = np.meshgrid(*(group[axis].data for axis in _PLACES), indexing="ij")
-        columns = [
-            _column(axis, group[axis], line) for axis, line in zip(_PLACES, lines, strict=True)
-        ]
+        places = zip(_PLACES, lines, strict=True)
+        columns = [one for x, line in places for one in _columns(x, group[x], {"": line})]
         for name, v in maps.items():
             # a column for each of its components
             parts = v.data.reshape(lines[0].size, -1).T
-            columns += _numbered(name, v, parts) if len(parts) > 1 else [_column(name, v, parts)]
+            several = len(parts) > 1
+            columns += _columns(name, v, {f" {k}" * several: p for k, p in enumerate(parts, 1)})
         yield "map", columns
 
 
-def _columns(name: str, variable: Variable, dimension: str) -> Iterator[Column]:
+def _along(variable: Variable, dimension: str) -> dict[str, NDArray[np.generic]]:
+    """What of a variable runs along a dimension, by what its name is followed by."""
     data, dims = variable.data, variable.dims
     if dims == (dimension,):
-        yield _column(name, variable, data)
-    elif dims == (dimension, _PART):
-        kinds = {"real": data[:, 0], "imaginary": data[:, 1], "amplitude": np.hypot(*data.T)}
-        yield from (_column(f"{name} {kind}", variable, one) for kind, one in kinds.items())
-    elif dimension == _SAMPLE and len(dims) == 2 and dims[1] == dimension:
-        yield from _numbered(f"{name} {dims[0]}", variable, data)
+        return {"": data}
+    if dims == (dimension, _PART):
+        return {" real": data[:, 0], " imaginary": data[:, 1], " amplitude": np.hypot(*data.T)}
+    if dimension == _SAMPLE and len(dims) == 2 and dims[1] == dimension:
+        return {f" {dims[0]} {k}": row for k, row in enumerate(data, 1)}
+    return {}
 
 
-def _column(name: str, variable: Variable, data: NDArray[np.generic]) -> Column:
-    """Name with unit, and values of a column."""
-    return f"{name} [{variable.units}]" if variable.units else name, data.ravel()
-
-
-def _numbered(name: str, variable: Variable, rows: NDArray[np.generic]) -> list[Column]:
-    return [_column(f"{name} {k}", variable, row) for k, row in enumerate(rows, 1)]
+def _columns(
+    name: str, variable: Variable, parts: Mapping[str, NDArray[np.generic]]
+) -> list[Column]:
+    """Name with unit, and values of every part of a variable."""
+    unit = f" [{variable.units}]" if variable.units else ""
+    return [(f"{name}{part}{unit}", data.ravel()) for part, data in parts.items()]

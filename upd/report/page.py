@@ -8,7 +8,7 @@ import io
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
@@ -46,6 +46,7 @@ _HEADINGS = {
 _PARTS_OF_SECTIONS = ("tables", "notes", "panels", "texts", "file", "surfaces")
 #: figures beside the first tables
 _OPENED = 2
+_json = partial(json.dumps, separators=(",", ":"), allow_nan=False)
 
 
 #: how it ended: passed, warning or failed, the word for it, and a sentence
@@ -179,10 +180,6 @@ def symbols(text: str) -> Markup:
     return Markup(_INDEX.sub(r"\1<sub>\2</sub>", str(escape(spelled))))
 
 
-def _json(content: Any) -> str:
-    return json.dumps(content, separators=(",", ":"), allow_nan=False)
-
-
 def versions_text(versions: Mapping[str, str]) -> str:
     """Packages with their versions, as a page ends."""
     return f"Versions: {', '.join(f'{k} {v}' for k, v in versions.items())}." if versions else ""
@@ -209,19 +206,15 @@ def _panels(charts: Iterable[Chart], pictures: Mapping[str, Path]) -> list[dict[
         # at most six charts: a sheet of more is not read
         drawn = [chart for chart in mine if chart.sheet][:6] or mine[:6]
         png = pictures[name].read_bytes() if name in pictures else chart_png(drawn)
-        titles = dict.fromkeys(chart.title for chart in mine)
-        groups = [
-            {"title": title, "charts": [_data(c) for c in mine if c.title == title]}
-            for title in titles
-        ]
+        titles: dict[str, list[dict[str, Any]]] = {}
+        for chart in mine:
+            note = " ".join(filter(None, (sentence(chart.detail), chart.note)))
+            case = chart.case.replace("muN", "µN")
+            one = {"case": case, "note": note, "figure": figure(chart)}
+            titles.setdefault(chart.title, []).append(one)
+        groups = [{"title": title, "charts": found} for title, found in titles.items()]
         panels.append({"name": name, "heading": heading, "image": image_uri(png), "groups": groups})
     return panels
-
-
-def _data(chart: Chart) -> dict[str, Any]:
-    """A chart for the page's script."""
-    note = " ".join(filter(None, (sentence(chart.detail), chart.note)))
-    return {"case": chart.case.replace("muN", "µN"), "note": note, "figure": figure(chart)}
 
 
 def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:

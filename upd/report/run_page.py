@@ -11,10 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from upd.cache.folders import plain_name
 from upd.errors import InputError
 from upd.labels import number, percent, sentence, shown
 from upd.plot.answer_table import AnswerTable
-from upd.plot.chart import Axis, Chart, Entry
+from upd.plot.chart import Chart, Entry
 from upd.plot.style import colour_range
 from upd.plot.surface import read_surface
 from upd.report import tables
@@ -27,6 +28,8 @@ from upd.scene.read import leaves
 
 log = logging.getLogger("upd.report")
 
+#: how the line of the log with the packages begins
+_VERSIONS = "versions: "
 #: below tables of numbers
 UNITS = "A number without a unit is a ratio or a count."
 
@@ -38,7 +41,10 @@ def write_run_report(folder: Path) -> Path:
     """
     run = read_run(folder)
     title = run.summary["title"] or run.summary["scene"]
-    html = page_text(title, run_sections(run), verdict=verdict(run.summary), footer=run.origin)
+    started = f", run on {run.log[0]['time'].partition(',')[0]}" if run.log else ""
+    found = (line["text"] for line in run.log if line["text"].startswith(_VERSIONS))
+    footer = f"Run folder {plain_name(run.path)}{started}. {sentence(next(found, ''))}".rstrip()
+    html = page_text(title, run_sections(run), verdict=verdict(run.summary), footer=footer)
     return write_page(run.path / "report.html", html)
 
 
@@ -120,48 +126,45 @@ def run_surfaces(run: RunFolder) -> list[dict[str, Any]]:
     files = contact or sorted(
         run.path.glob("modes_*.vtu"), key=lambda f: ("glued" not in f.stem, "asymmetric" in f.stem)
     )
+    # in the order of their numbers in the files
+    counts = run.summary["size"].get("n_dof", {})
+    bodies = list(dict.fromkeys(key.partition(",")[0] for key in counts))
+    glued = [name for name in bodies if name not in ("left", "right")] or bodies
     out = []
     for file in files:
         label = file.stem.removeprefix("modes_").replace("_", ", ")
         try:
-            out.append(read_surface(file, _bodies(run, file.stem), label))
+            out.append(read_surface(file, glued if "glued" in file.stem else bodies, label))
         except (OSError, ValueError, KeyError) as problem:
             log.warning("%s: no three-dimensional view (%s)", file.name, problem)
     return out
-
-
-def _bodies(run: RunFolder, stem: str) -> list[str]:
-    """Bodies in the order of their numbers in the file."""
-    counts = run.summary["size"].get("n_dof", {})
-    names = list(dict.fromkeys(key.partition(",")[0] for key in counts))
-    if "glued" in stem:
-        return [n for n in names if n not in ("left", "right")] or names
-    return names
 
 
 # ---------------------------------------------------------------- several runs
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
-    """Write the page that compares the runs in ``folders`` to ``path``. Raises InputError."""
+    """Write one page that shows several runs side by side to ``path`` (.html); returns it.
+
+    Raises InputError when a folder is no run, there are fewer than two, or the place cannot be
+    written.
+    """
     target = Path(path)
+    if any((Path(folder) / "sweep.json").is_file() for folder in folders):
+        raise InputError("a comparison is of runs: give each sweep's folder by itself")
     if len(folders) < 2:
         raise InputError("a comparison needs two runs or more: give their folders")
     if target.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{target}: a comparison is a page; give a name that ends in .html")
     runs = [read_run(Path(folder)) for folder in folders]
-    names = run_names(runs)
-    title = f"Comparison of {', '.join(names[:-1])} and {names[-1]}"
-    return write_page(target, page_text(title, comparison_sections(runs, names)))
-
-
-def run_names(runs: Sequence[RunFolder]) -> list[str]:
-    """Names of the run folders, from the folder that holds them all."""
     paths = [run.path.resolve() for run in runs]
     if len(set(paths)) < len(paths):
         raise InputError("a folder is duplicated; to fix it: give each folder once")
+    # from the folder that holds them all
     common = os.path.commonpath(paths)
-    return [str(path.relative_to(common)) for path in paths]
+    names = [str(path.relative_to(common)) for path in paths]
+    title = f"Comparison of {', '.join(names[:-1])} and {names[-1]}"
+    return write_page(target, page_text(title, comparison_sections(runs, names)))
 
 
 def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
@@ -178,16 +181,6 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
     about = "Every run has one colour; points and lines are those of its own page."
     heading = "In what the scenes differ"
     table = AnswerTable(heading, ("entry", *names), differ)
-    return [
-        Section("Main numbers", [first], texts=[UNITS]),
-        Section("Runs", [_runs_table(runs, names)]),
-        Section(heading, [table], texts=["In nothing."] * (not differ)),
-        Section("Figures", charts=charts, texts=[about]),
-        Section("All other numbers", [others]),
-    ]
-
-
-def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
     verdicts = [verdict(run.summary) for run in runs]
     columns = {
         "run": names,
@@ -195,19 +188,29 @@ def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
         "verdict": [f"{word}. {text}" for _, word, text in verdicts],
         "# seconds": [f"{run.summary['cost']['total_s']:.1f}" for run in runs],
     }
-    return tables.filled("Runs", columns)
+    return [
+        Section("Main numbers", [first], texts=[UNITS]),
+        Section("Runs", [tables.filled("Runs", columns)]),
+        Section(heading, [table], texts=["In nothing."] * (not differ)),
+        Section("Figures", charts=charts, texts=[about]),
+        Section("All other numbers", [others]),
+    ]
 
 
 def numbers(
     results: Sequence[Sequence[Entry]], names: Sequence[str], main: Container[tuple[str, str]]
-) -> tuple[AnswerTable, AnswerTable]:
+) -> list[AnswerTable]:
     """Numbers of all runs side by side, in the order of the first run that has them: the main ones
     (name and case), and all others.
     """
     known = [{(r["name"], r["case"]): r for r in rows} for rows in results]
     keys = list(dict.fromkeys(key for rows in known for key in rows))
-
-    def side_by_side(heading: str, mine: Sequence[tuple[str, str]]) -> AnswerTable:
+    parts = {
+        "Main numbers": [key for key in keys if key in main],
+        "All other numbers": [key for key in keys if key not in main],
+    }
+    out = []
+    for heading, mine in parts.items():
         found = [[rows.get(key) for rows in known] for key in mine]
         given = [{(row["reference"], row["source"]) for row in rows if row} for rows in found]
         # runs of other loads have another reference
@@ -223,12 +226,8 @@ def numbers(
             "# reference": [number(value) for value, _ in references],
             "source": [source if value is not None else "" for value, source in references],
         }
-        return tables.filled(heading, columns)
-
-    return (
-        side_by_side("Main numbers", [key for key in keys if key in main]),
-        side_by_side("All other numbers", [key for key in keys if key not in main]),
-    )
+        out.append(tables.filled(heading, columns))
+    return out
 
 
 def _spread(rows: Sequence[Entry | None]) -> float | None:
@@ -270,20 +269,15 @@ def _together(group: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart
 
     Every run has one colour, its curves, marks and areas share it; limits are drawn once.
     """
-    first = group[0][1]
-
-    def axis(name: str) -> Axis:
+    first, axes = group[0][1], dict[str, Any]()
+    for name in ("x", "y"):
         one, *others = (getattr(c, name) for _, c in group)
-        same: Axis = (
-            one if all(other == one for other in others) else replace(one, low=None, high=None)
-        )
-        return same
-
+        same = all(other == one for other in others)
+        axes[name] = one if same else replace(one, low=None, high=None)
     return replace(
         first,
         figure=first.title,
-        x=axis("x"),
-        y=axis("y"),
+        **axes,
         detail="",
         traces=tuple(
             replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False)

@@ -16,7 +16,6 @@ import numpy as np
 from upd.labels import counted, listed, number, sentence, unit_label
 from upd.plot import sweep_charts as charts
 from upd.plot.answer_table import AnswerTable
-from upd.plot.chart import Chart
 from upd.report.folder import read_json
 from upd.report.page import Section, Verdict, page_text, versions_text, write_page
 from upd.report.tables import filled, sample_table, stage_table, with_unit
@@ -40,7 +39,6 @@ class SweepFolder:
     with values, status, reason, warnings and seconds.
     """
 
-    path: Path
     data: Mapping[str, Any]
     axes: tuple[charts.Parameter, ...]
     points: list[dict[str, Any]]
@@ -73,7 +71,7 @@ def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json. Raises InputError when it is missing or damaged."""
     found = read_json(folder / "sweep.json", _KEYS, "sweep")
     axes = [charts.Parameter(one["path"], tuple(one["values"])) for one in found["axes"]]
-    return SweepFolder(folder, found, charts.told_apart(axes), found["points"])
+    return SweepFolder(found, charts.told_apart(axes), found["points"])
 
 
 def write_sweep_report(folder: Path) -> Path:
@@ -95,7 +93,17 @@ def write_sweep_report(folder: Path) -> Path:
 
 def sweep_sections(sweep: SweepFolder) -> list[Section]:
     """The page of a sweep."""
-    drawn, stages = _charts(sweep), sweep.data["cost"].get("stages_s", {})
+    if sweep.sampled:
+        drawn = charts.sample_charts(sweep.sampled, [c.values for c in sweep.columns])
+    else:
+        varied = [p.short for p in sweep.axes if len(p.values) > 1]
+        over = f"Followed numbers over {' and '.join(varied)}"
+        drawn = [replace(c, heading=over) for c in charts.sweep_charts(sweep.axes, sweep.columns)]
+    cost = sweep.data["cost"]
+    seconds = [p["seconds"] for p in sweep.points] or [0.0]
+    total, memory = math.fsum(seconds), cost.get("peak_rss_mb", 0.0)
+    each = f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s)"
+    costs = f"{each}, {total:.1f} s for all together, {memory:.0f} MB of memory at most."
     none = "The sweep left no figures: nothing varies, or no point was solved."
     scene = "The scene of all points; the parameters above replace its entries."
     *before, points = (Section(one.heading, [one]) for one in sweep_tables(sweep, MOST_ROWS))
@@ -104,7 +112,7 @@ def sweep_sections(sweep: SweepFolder) -> list[Section]:
         *before,
         Section("Figures", charts=drawn, texts=[none] * (not drawn)),
         points,
-        Section("Cost", [stage_table(stages)], texts=[_costs(sweep)]),
+        Section("Cost", [stage_table(cost.get("stages_s", {}))], texts=[costs]),
         Section("Scene file", texts=[scene], file=sweep.data["text"]),
     ]
 
@@ -128,10 +136,13 @@ def sweep_tables(sweep: SweepFolder, most: int) -> list[AnswerTable]:
 
 def _grid(sweep: SweepFolder) -> Section:
     """What was varied."""
-    columns = {
-        "parameter": [p.path for p in sweep.axes],
-        "values": [_values(p) for p in sweep.axes],
-    }
+    values = []
+    for parameter in sweep.axes:
+        shown = [parameter.shown(k) for k in range(len(parameter.values))]
+        # of many the first and the last
+        shown = shown if len(shown) <= _FEW else [*shown[:3], "...", shown[-1]]
+        values.append(f"{', '.join(shown)} {unit_label(parameter.unit)}".rstrip())
+    columns = {"parameter": [p.path for p in sweep.axes], "values": values}
     points, heading = counted(len(sweep.points), "point"), "Grid"
     text = f"{points}{': every value with every other' * (len(sweep.axes) > 1)}."
     if sample := sweep.data.get("sample"):
@@ -143,24 +154,6 @@ def _grid(sweep: SweepFolder) -> Section:
         )
     notes = map(sentence, sweep.data["plan"].get("notes", []))
     return Section(heading, [filled(heading, columns)], texts=[text, *notes])
-
-
-def _values(parameter: charts.Parameter) -> str:
-    """The values of a parameter with their unit, of many the first and the last."""
-    shown = [parameter.shown(k) for k in range(len(parameter.values))]
-    shown = shown if len(shown) <= _FEW else [*shown[:3], "...", shown[-1]]
-    return f"{', '.join(shown)} {unit_label(parameter.unit)}".rstrip()
-
-
-def _charts(sweep: SweepFolder) -> list[Chart]:
-    """Charts of a sample or of a grid."""
-    if sweep.sampled:
-        return charts.sample_charts(sweep.sampled, [c.values for c in sweep.columns])
-    varied = [p.short for p in sweep.axes if len(p.values) > 1]
-    over = f"Followed numbers over {' and '.join(varied)}"
-    return [
-        replace(chart, heading=over) for chart in charts.sweep_charts(sweep.axes, sweep.columns)
-    ]
 
 
 def verdict(points: Sequence[Mapping[str, Any]]) -> Verdict:
@@ -223,11 +216,3 @@ def _points_table(sweep: SweepFolder, most: int) -> AnswerTable:
         "arrays with named axes. A number without a unit is a ratio or a count."
     )
     return filled("Table", columns, " ".join(notes))
-
-
-def _costs(sweep: SweepFolder) -> str:
-    """Seconds of the points, memory."""
-    seconds = [p["seconds"] for p in sweep.points] or [0.0]
-    total, memory = math.fsum(seconds), sweep.data["cost"].get("peak_rss_mb", 0.0)
-    each = f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s)"
-    return f"{each}, {total:.1f} s for all together, {memory:.0f} MB of memory at most."

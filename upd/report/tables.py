@@ -145,14 +145,12 @@ def _case_table(cases: Sequence[Sequence[Entry]]) -> AnswerTable:
     """A row for each of the first cases, a column for every number."""
     kept = cases[: _CASES - (len(cases) > _CASES)]
     more = len(cases) - len(kept)
-
-    def cell(entry: Entry) -> str:
-        return f"{labels.shown(entry, unit=False)} {labels.plus_minus(entry)}".rstrip()
-
-    columns = {"case": [row[0]["case"] for row in kept]} | {
-        f"# {with_unit(number_label(one['name']), one['unit'])}": [cell(row[k]) for row in kept]
-        for k, one in enumerate(cases[0])
-    }
+    columns = {"case": [row[0]["case"] for row in kept]}
+    for k, one in enumerate(cases[0]):
+        columns[f"# {with_unit(number_label(one['name']), one['unit'])}"] = [
+            f"{labels.shown(row[k], unit=False)} {labels.plus_minus(row[k])}".rstrip()
+            for row in kept
+        ]
     return filled("By case", columns, f"{more} more cases: see all numbers." if more else "")
 
 
@@ -192,11 +190,11 @@ def error_parts(entry: Entry) -> list[tuple[str, float | None, str, str]]:
         (f"input {part['path']}", part["share"], "", part["basis"])
         for part in entry.get("input_parts", ())
     ]
-
-    def size(part: tuple[str, float | None, str, str]) -> float:
-        return float("-inf") if part[1] is None else -part[1]
-
-    return sorted(errors, key=size) + sorted(inputs, key=size)
+    return [
+        part
+        for parts in (errors, inputs)
+        for part in sorted(parts, key=lambda part: (part[1] is not None, -(part[1] or 0.0)))
+    ]
 
 
 def budget_table(entries: Sequence[Entry]) -> AnswerTable:

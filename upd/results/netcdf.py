@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -108,8 +108,14 @@ def open_netcdf(path: Path) -> Iterator[h5netcdf.File]:
         SHA-256 the summary.json beside it has.
     """
     try:
-        if path.name == "result.nc":
-            _check_digest(path)
+        known, summary = None, path.with_name("summary.json")
+        with suppress(OSError, ValueError, AttributeError, RecursionError):
+            if path.name == "result.nc":
+                known = json.loads(summary.read_text("utf-8")).get(DIGEST)
+        if known and known != file_digest(path):
+            raise OSError(
+                "it is not as the run wrote it, its SHA-256 is another; run the scene again"
+            )
         with h5netcdf.File(path, "r") as file:
             yield file
     except (OSError, UpdError):
@@ -117,15 +123,6 @@ def open_netcdf(path: Path) -> Iterator[h5netcdf.File]:
     except Exception as error:
         # damaged files raise errors of any kind in HDF5
         raise OSError(one_line(error)) from error
-
-
-def _check_digest(path: Path) -> None:
-    try:
-        known = json.loads(path.with_name("summary.json").read_text("utf-8")).get(DIGEST)
-    except (OSError, ValueError, AttributeError, RecursionError):
-        return
-    if known and known != file_digest(path):
-        raise OSError("it is not as the run wrote it, its SHA-256 is another; run the scene again")
 
 
 def read_netcdf(path: Path) -> dict[str, Group]:

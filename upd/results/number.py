@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from upd.results.case import Case
@@ -99,11 +100,6 @@ class InputPart:
     basis: str
 
     @property
-    def share(self) -> float:
-        """Size of the change."""
-        return abs(self.change)
-
-    @property
     def known(self) -> bool:
         """Whether it was found."""
         return math.isfinite(self.change)
@@ -162,7 +158,7 @@ class Result:
         JCGM 100:2008, Guide to the expression of uncertainty in measurement, eq. (10).
         """
         known = self.inputs and all(part.known for part in self.inputs)
-        return math.hypot(*(part.share for part in self.inputs)) if known else None
+        return math.hypot(*(part.change for part in self.inputs)) if known else None
 
     @property
     def error(self) -> float | None:
@@ -186,17 +182,10 @@ class Result:
             thesis_error=self.printed_error,
             error_parts=list(map(as_json, self.parts)),
             input_error=self.input_error,
-            input_parts=[as_json(one, share=one.share) for one in self.inputs],
+            input_parts=[as_json(one, share=abs(one.change)) for one in self.inputs],
             case_fields=self.case.given(),
         )
         return {name: found[name] for name in found if name not in _INSIDE}
-
-
-def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, ...]:
-    """The numbers with what the inputs known within limits do to them."""
-    return tuple(
-        r if r.withheld else replace(r, inputs=found.get((r.name, r.case), ())) for r in results
-    )
 
 
 def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
@@ -219,8 +208,15 @@ def read_result(data: Mapping[str, Any]) -> Result:
     )
 
 
-def with_estimates(results: Iterable[Result], estimates: Estimates) -> tuple[Result, ...]:
-    """The numbers with the parts of their errors; those that have some keep their own."""
-    return tuple(
-        r if r.parts else with_parts(r, estimates.get((r.name, r.case), ())) for r in results
-    )
+def with_estimates(
+    results: Iterable[Result], estimates: Estimates, inputs: InputParts = MappingProxyType({})
+) -> tuple[Result, ...]:
+    """The numbers with the parts of their errors, those that have some with their own, and with
+    what the inputs known within limits do to them.
+    """
+    out = []
+    for one in results:
+        key = one.name, one.case
+        found = one if one.parts else with_parts(one, estimates.get(key, ()))
+        out.append(found if one.withheld else replace(found, inputs=inputs.get(key, one.inputs)))
+    return tuple(out)

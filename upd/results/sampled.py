@@ -121,7 +121,12 @@ def sampled_number(
     """
     known = np.isfinite(values)
     drawn, nominal = values[1:][known[1:]], float(values[0]) if known[0] else None
-    found = _with_moments(SampledNumber(name, case, unit, nominal, None, len(drawn)), drawn)
+    found = SampledNumber(name, case, unit, nominal, None, len(drawn))
+    if found.count:
+        ends = (TAIL, 1.0 - TAIL) if found.resolved else (0.0, 1.0)
+        low, high = map(float, np.quantile(drawn, ends))
+        deviation = float(np.std(drawn, ddof=1)) if found.count > 2 else None
+        found = replace(found, mean=float(drawn.mean()), deviation=deviation, low=low, high=high)
     why = _unknown(found, inputs, paths)
     if nominal and found.deviation is not None:
         found = replace(found, band=LIMITS * found.deviation / abs(nominal))
@@ -149,16 +154,6 @@ def _unknown(number: SampledNumber, inputs: Sequence[InputPart], paths: Sequence
         f"no first-order band ({'; '.join(lost)})": bool(lost),
     }
     return next((why for why, holds in reasons.items() if holds), "")
-
-
-def _with_moments(number: SampledNumber, drawn: Array) -> SampledNumber:
-    """A number with mean, deviation and both ends of its sample."""
-    if not number.count:
-        return number
-    low, high = np.quantile(drawn, (TAIL, 1.0 - TAIL) if number.resolved else (0.0, 1.0))
-    deviation = float(np.std(drawn, ddof=1)) if number.count > 2 else None
-    mean = float(drawn.mean())
-    return replace(number, mean=mean, deviation=deviation, low=float(low), high=float(high))
 
 
 def _compared(found: SampledNumber, drawn: Array, first: Array, nominal: float) -> SampledNumber:

@@ -15,14 +15,8 @@ from upd.scene import quantities as q
 INSIDE = ("text", "uncertain", "fitted")
 
 
-class Table:
-    """Base of all tables of a scene: no other keys, no number that is not finite."""
-
-    __pydantic_config__ = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
-
-
 @dataclass(frozen=True)
-class MaterialData(Table):
+class MaterialData:
     """Elastic constants of one body.
 
     Attributes
@@ -45,7 +39,7 @@ class MaterialData(Table):
 
 
 @dataclass(frozen=True)
-class MeshChoice(Table):
+class MeshChoice:
     """Element family and mirror symmetry.
 
     Attributes
@@ -65,7 +59,7 @@ class MeshChoice(Table):
 
 
 @dataclass(frozen=True)
-class SolverChoice(Table):
+class SolverChoice:
     """Linear solver and the memory it may use.
 
     Attributes
@@ -90,7 +84,7 @@ class SolverChoice(Table):
 
 
 @dataclass(frozen=True)
-class LeftOut(Table):
+class LeftOut:
     """Largest relative change of a number by an effect left out before the run warns.
 
     Attributes
@@ -123,25 +117,7 @@ class LeftOut(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rotation(Table):
-    """The centrifugal force on a damper, F_C, or what gives it: F_C = m r w^2.
-
-    Attributes
-    ----------
-    radius
-        Of the damper's centre of mass from the axis of rotation.
-    speed
-        Of the rotation.
-    """
-
-    centrifugal: q.Centrifugal | None = None
-    mass: q.Mass | None = None
-    radius: q.Radius | None = None
-    speed: q.Speed | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneBase(Table):
+class SceneBase:
     """What every scene has. ``geometry`` holds the recipe's name under "recipe" and its parameters
     beside it, in mm.
 
@@ -162,6 +138,8 @@ class SceneBase(Table):
         The recipe and its parameters.
     """
 
+    #: of all tables of a scene: no other keys, no number that is not finite
+    __pydantic_config__ = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
     #: whether masses count
     moves: ClassVar[bool] = True
     #: tables that only this kind of scene has
@@ -185,6 +163,12 @@ class SceneBase(Table):
         return str(self.geometry["recipe"])
 
     @property
+    def body_materials(self) -> Mapping[str, MaterialData]:
+        """Material of every body; one of all bodies under "all"."""
+        known: Any = self
+        return known.materials if hasattr(known, "materials") else {"all": known.material}
+
+    @property
     def estimates(self) -> bool:
         """Whether errors are estimated."""
         return bool(self.accuracy != q.UNKNOWN)
@@ -205,10 +189,6 @@ class SceneBase(Table):
         InputError whose arguments are the problems.
         """
         return self
-
-    def problems(self) -> Iterator[str]:
-        """What does not fit together."""
-        yield from ()
 
 
 def repeated(path: str, values: Sequence[float | str]) -> list[str]:
@@ -244,7 +224,7 @@ Fit = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class FaceFriction(Table):
+class FaceFriction:
     """Coulomb friction on both faces of the damper, and their fit.
 
     Attributes
@@ -266,7 +246,7 @@ class FaceFriction(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DamperChoice(Rotation):
+class DamperChoice:
     """The rigid damper; mass and inertia come from its mesh.
 
     Attributes
@@ -275,11 +255,18 @@ class DamperChoice(Rotation):
         Force through its centre of mass, upwards, F_C; or "from speed": F_C = m r w^2.
     mass
         Of the damper, spread evenly over its volume, instead of its density.
+    radius
+        Of the damper's centre of mass from the axis of rotation.
+    speed
+        Of the rotation.
     density
         Of the damper, where it is not of the blades' material; the density or the mass.
     """
 
     centrifugal: q.Centrifugal = 350.0
+    mass: q.Mass | None = None
+    radius: q.Radius | None = None
+    speed: q.Speed | None = None
     density: q.Density | None = None
 
 
@@ -294,11 +281,6 @@ class RigBase(SceneBase):
     """
 
     material: MaterialData
-
-    @property
-    def body_materials(self) -> Mapping[str, MaterialData]:
-        """The one material, of all bodies."""
-        return {"all": self.material}
 
     @property
     def arrangement(self) -> str:

@@ -4,7 +4,7 @@ response.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
@@ -14,7 +14,6 @@ from upd.scene.base import (
     MaterialData,
     MeshChoice,
     SceneBase,
-    Table,
     unreachable_accuracy,
 )
 
@@ -24,7 +23,7 @@ BladedDiskWant = Annotated[str, q.one_of(BLADED_DISK_WANTS), q.Example('"modes"'
 
 
 @dataclass(frozen=True)
-class SectorModesChoice(Table):
+class SectorModesChoice:
     """Modes of every nodal diameter.
 
     Attributes
@@ -41,7 +40,7 @@ class SectorModesChoice(Table):
 
 
 @dataclass(frozen=True)
-class SpinChoice(Table):
+class SpinChoice:
     """Speed and excitation.
 
     Attributes
@@ -64,7 +63,7 @@ class SpinChoice(Table):
 
 
 @dataclass(frozen=True)
-class WedgeChoice(Table):
+class WedgeChoice:
     """The wedge in every gap between platforms, a rigid body; F_C = m r w^2 at each speed.
 
     Attributes
@@ -91,7 +90,7 @@ class WedgeChoice(Table):
 
 
 @dataclass(frozen=True)
-class WaveChoice(Table):
+class WaveChoice:
     """Response to the engine order of the crossing nearest to the operating speed.
 
     Attributes
@@ -145,11 +144,6 @@ class BladedDiskScene(SceneBase):
     rotation: SpinChoice
     damper: WedgeChoice = field(default_factory=WedgeChoice)
     response: WaveChoice = field(default_factory=WaveChoice)
-
-    @property
-    def body_materials(self) -> Mapping[str, MaterialData]:
-        """The one material."""
-        return {"all": self.material}
 
     @property
     def n_sectors(self) -> int:

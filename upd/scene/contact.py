@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import quantities as q
-from upd.scene.base import MaterialData, Rotation, SceneBase, Table, repeated
+from upd.scene.base import MaterialData, SceneBase, repeated
 from upd.scene.rotation import rotation_problems, volume_of
 
 #: body whose density is the damper's
@@ -41,7 +41,7 @@ Coupling = Literal["uncoupled", "coupled"]
 
 
 @dataclass(frozen=True)
-class ContactData(Table):
+class ContactData:
     """Coulomb friction and what the solver may assume.
 
     Attributes
@@ -85,7 +85,7 @@ class ContactData(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loads(Rotation):
+class Loads:
     """Normal forces, tangential forces as fractions of mu N, amplitude of the cycle likewise.
 
     Attributes
@@ -98,6 +98,10 @@ class Loads(Rotation):
         F_C = m r w^2.
     mass
         Of the damper; its material's density times its volume when None.
+    radius
+        Of the damper's centre of mass from the axis of rotation.
+    speed
+        Of the rotation.
     tangential
         Forces along the face, relative to friction times normal force. Cost: every one is solved,
         for every normal load and direction.
@@ -113,6 +117,10 @@ class Loads(Rotation):
         Largest force of the force-approach curve; the largest normal load when None.
     """
 
+    centrifugal: q.Centrifugal | None = None
+    mass: q.Mass | None = None
+    radius: q.Radius | None = None
+    speed: q.Speed | None = None
     normal: Annotated[tuple[q.NormalLoad, ...], q.FILLED]
     tangential: tuple[q.LoadRatio, ...] = ()
     directions: Annotated[tuple[q.Direction, ...], q.FILLED] = (0.0,)
@@ -128,7 +136,7 @@ class Loads(Rotation):
 
 
 @dataclass(frozen=True)
-class LawChoice(Table):
+class LawChoice:
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
     Attributes
@@ -183,11 +191,6 @@ class Scene(SceneBase):
     def analysis(self) -> str:
         """Name of the analysis, which the recipe declares."""
         return recipes.analyses(self.recipe)[0]
-
-    @property
-    def body_materials(self) -> Mapping[str, MaterialData]:
-        """Material of every body."""
-        return self.materials
 
     @property
     def coupled(self) -> bool:

@@ -20,7 +20,6 @@ from upd.scene.base import (
     DamperChoice,
     MeshChoice,
     RigBase,
-    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
@@ -32,9 +31,7 @@ from upd.scene.measured import (
     FittedMode,
     MeasuredChoice,
     fitted_modes,
-    main_ratio,
     measured_problems,
-    modal_ratios,
 )
 from upd.scene.rotation import with_damper
 
@@ -77,7 +74,7 @@ Samples = Annotated[
 
 
 @dataclass(frozen=True)
-class BladeReduction(Table):
+class BladeReduction:
     """Reduction of the blades.
 
     Attributes
@@ -91,7 +88,7 @@ class BladeReduction(Table):
 
 
 @dataclass(frozen=True)
-class HarmonicForce(Table):
+class HarmonicForce:
     """A force along x at mid-core of a blade, a F_E cos(k 2 pi f t + phase).
 
     Attributes
@@ -113,7 +110,7 @@ class HarmonicForce(Table):
 
 
 @dataclass(frozen=True)
-class ExcitationChoice(Table):
+class ExcitationChoice:
     """Harmonic forces at mid-core of the blades, swept between two frequencies.
 
     Attributes
@@ -149,14 +146,9 @@ class ExcitationChoice(Table):
         q.Example('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
     ] = (HarmonicForce(),)
 
-    @property
-    def highest_harmonic(self) -> int:
-        """The highest that is excited."""
-        return max(one.harmonic for one in self.forces)
-
 
 @dataclass(frozen=True)
-class BalanceChoice(Table):
+class BalanceChoice:
     """Harmonic balance, or time integration in its place.
 
     Attributes
@@ -181,7 +173,7 @@ class BalanceChoice(Table):
 
 
 @dataclass(frozen=True)
-class PerformanceChoice(Table):
+class PerformanceChoice:
     """F_C/F_E of the performance curve, evenly spread on a logarithmic axis.
 
     Attributes
@@ -249,6 +241,10 @@ class ForcedScene(RigBase):
     def modal_damping(self, frequency: Array, share: Array) -> Array:
         """Damping ratios (m,) of modes of the blades without damper.
 
+        A mode takes the ratio of the fitted mode next to it in frequency (by ratio), of each blade
+        by the share of the modal mass that moves there; a blade that was not measured takes the
+        other's.
+
         Parameters
         ----------
         frequency
@@ -256,7 +252,16 @@ class ForcedScene(RigBase):
         share
             (m, 2) of the left and of the right blade in the modal mass.
         """
-        return modal_ratios(self.fitted, self.excitation.damping, frequency, share)
+        if not self.fitted:
+            return np.full(len(frequency), self.excitation.damping)
+        f = np.maximum(frequency, np.finfo(float).tiny)
+        ratios = np.zeros_like(share)
+        for k, side in enumerate(SIDES):
+            mine = [one for one in self.fitted if one[0] == side] or self.fitted
+            known, zeta = (np.array([one[i] for one in mine]) for i in (1, 2))
+            nearest = np.abs(np.log(f)[:, None] - np.log(known)).argmin(axis=1)
+            ratios[:, k] = zeta[nearest]
+        return np.asarray((share * ratios).sum(axis=1) / share.sum(axis=1))
 
     @property
     def stiffnesses(self) -> dict[str, StiffnessChoice]:
@@ -284,9 +289,9 @@ class ForcedScene(RigBase):
         if 0.0 in e.force:
             problems.append("excitation.force: 0 N excites nothing; give a positive force")
         changed: ForcedScene = with_damper(self, data, problems)
-        fitted = fitted_modes(self.measured, data, "excitation")
+        fitted, ratio = fitted_modes(self.measured, data, "excitation")
         if fitted:
-            changed, e = replace(changed, fitted=fitted), replace(e, damping=main_ratio(fitted))
+            changed, e = replace(changed, fitted=fitted), replace(e, damping=ratio)
         ratios = tuple(changed.damper.centrifugal / force for force in e.force)
         e = replace(e, centrifugal_to_force=ratios or e.centrifugal_to_force)
         return replace(changed, excitation=e)
@@ -303,7 +308,8 @@ class ForcedScene(RigBase):
                 "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio "
                 "without size; give a positive force"
             )
-        highest = max(b.harmonics, e.highest_harmonic)
+        excited = max(one.harmonic for one in e.forces)
+        highest = max(b.harmonics, excited)
         if b.samples != "auto" and b.samples <= 2 * highest:
             yield (
                 f"balance.samples: {b.samples} cannot carry harmonic {highest}; take more than "
@@ -311,10 +317,10 @@ class ForcedScene(RigBase):
             )
         if not combined_forces(e):
             yield "excitation.forces: cancel each other; give forces that excite something"
-        elif (springs or b.method == "balance") and b.harmonics < e.highest_harmonic:
+        elif (springs or b.method == "balance") and b.harmonics < excited:
             yield (
                 f"balance.harmonics: {b.harmonics} do not carry the force in harmonic "
-                f"{e.highest_harmonic}; write {e.highest_harmonic} or more"
+                f"{excited}; write {excited} or more"
             )
         if self.performance.lowest >= self.performance.highest:
             yield "performance.lowest: is not below performance.highest"

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator
 
 from upd.errors import InputError
 from upd.scene import quantities as q
-from upd.scene.base import FaceFriction, Fit, Table
+from upd.scene.base import FaceFriction, Fit
 from upd.units import parse_quantity
 
 Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example('"1e6 N/mm"')]
@@ -86,7 +86,7 @@ Lines = Annotated[
 
 
 @dataclass(frozen=True)
-class FaceLines(Table):
+class FaceLines:
     """Lattice lines of one face that replace those of the scene.
 
     Attributes
@@ -171,7 +171,7 @@ class FrictionChoice(FaceFriction):
 
 
 @dataclass(frozen=True)
-class FaceStiffness(Table):
+class FaceStiffness:
     """Contact stiffness of one face.
 
     Attributes
@@ -185,7 +185,7 @@ class FaceStiffness(Table):
 
 
 @dataclass(frozen=True)
-class StiffnessChoice(Table):
+class StiffnessChoice:
     """Contact stiffness of both faces: totals, or from a contact analysis.
 
     Attributes

@@ -100,11 +100,6 @@ class SceneKey:
         return unit_inside(self.kind) if self.kind in UNITS else self.kind
 
     @property
-    def units(self) -> tuple[str, ...]:
-        """All that are understood."""
-        return tuple(u for u in UNITS.get(self.kind, {}) if u)
-
-    @property
     def path(self) -> str:
         """In the file, with its tables: "contact.friction"."""
         return ".".join(self.steps)
@@ -115,28 +110,20 @@ class SceneKey:
         return self.steps[-1]
 
 
-def scene_keys(scene: Any) -> list[SceneKey]:
-    """The keys of a loaded scene with their values, its recipe's parameters among them."""
-    keys = _walk(type(scene), scene, None, (), tomllib.loads(scene.text))
+def scene_keys(scene: Any, *, absent: bool = False) -> list[SceneKey]:
+    """The keys of a loaded scene with their values, its recipe's parameters among them; at last,
+    where asked for, those of tables by name, [measured.NAME], of which it has none.
+    """
+    keys = table_keys(type(scene), scene, given=tomllib.loads(scene.text))
     given = {one.path: one.given for one in scene.uncertain.values()}
-    return [
+    out = [
         replace(key, value=toml_value(given[key.path])) if key.path in given else key
         for key in keys
     ]
-
-
-def absent_keys(scene: Any) -> list[SceneKey]:
-    """The keys of tables by name, [measured.NAME], of which a loaded scene has none."""
-    return [
-        key
-        for key in class_keys(type(scene))
-        if _NAME in key.steps and not getattr(scene, key.steps[0])
+    of_class = table_keys(type(scene)) if absent else ()
+    return out + [
+        key for key in of_class if _NAME in key.steps and not getattr(scene, key.steps[0])
     ]
-
-
-def class_keys(scene: type[Any]) -> list[SceneKey]:
-    """The keys of a kind of scene; those of its recipe are in `recipe_keys`."""
-    return list(_walk(scene, None, None, (), {}))
 
 
 def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[SceneKey]:
@@ -155,7 +142,7 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
     # the unit has a column of its own
     return [
         replace(key, meaning=_UNIT.sub("", key.meaning), given=key.value != key.default)
-        for key in _walk(recipes.parameters(recipe), made, None, path, {})
+        for key in table_keys(recipes.parameters(recipe), made, path=path)
     ]
 
 
@@ -258,10 +245,27 @@ def chosen_keys(keys: Sequence[SceneKey], asked: str) -> list[SceneKey]:
     )
 
 
-def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> Iterator[SceneKey]:
+def table_keys(
+    cls: type[Any],
+    value: Any = None,
+    usual: Any = None,
+    path: Steps = (),
+    given: Any = None,
+) -> Iterator[SceneKey]:
     """Keys of one table, first its own, then those of the tables in it; what must be given first.
 
-    ``usual`` is the table that a scene without it has, if any.
+    Parameters
+    ----------
+    cls
+        Of the table: of a scene, or of a recipe's parameters.
+    value
+        The table itself; without it the keys have no values.
+    usual
+        The table that a scene without it has, if any.
+    path
+        Tables around it.
+    given
+        What the file gives of it.
     """
     texts, types = entries(cls), q.hints(cls)
     tables: list[Iterator[SceneKey]] = []
@@ -277,11 +281,11 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
             tables.append(_geometry(value, mine))
         elif is_dataclass(inner) and (here is not None or value is None):
             table_default = default if is_dataclass(default) else None
-            tables.append(_walk(inner, here, table_default, where, mine))  # type: ignore[arg-type]
+            tables.append(table_keys(inner, here, table_default, where, mine))  # type: ignore[arg-type]
         elif item := q.named_table(hint):
             for name, one in ({_NAME: None} if here is None else here).items():
                 own = mine.get(name, {}) if isinstance(mine, Mapping) else {}
-                tables.append(_walk(item, one, None, (*where, name), own))
+                tables.append(table_keys(item, one, None, (*where, name), own))
         else:
             # of a recipe's parameter its field has them
             kind = str(f.metadata.get("quantity") or q.quantity_kind(hint))

@@ -10,23 +10,22 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.errors import InputError
 from upd.measured.curve import RESPONSE_UNITS, CurveLabel, MeasuredCurve, label_of
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
-from upd.scene.base import Table
 
-Array = NDArray[np.float64]
 #: excitation.damping where the measured free curves give it, and its value until they are read
 FROM_MEASURED, UNTIL_READ = "measured", "0.5 %"
+#: blade, frequency in Hz and damping ratio of a mode of a blade without damper
+FittedMode = tuple[str, float, float]
 ResponseUnit = Annotated[str, q.one_of(RESPONSE_UNITS), q.Example('"(m/s2)/N"')]
 
 
 @dataclass(frozen=True)
-class MeasuredChoice(Table):
+class MeasuredChoice:
     """A measured frequency response, drawn over the computed ones and compared with them.
 
     Attributes
@@ -82,29 +81,6 @@ class MeasuredChoice(Table):
             column=self.column,
             unit=self.unit,
         )
-
-
-@dataclass(frozen=True)
-class FittedMode:
-    """Damping of a mode of a blade without damper, by `upd.measured.fit_damping`.
-
-    Attributes
-    ----------
-    blade
-        Whose mode it is.
-    frequency
-        Hz.
-    zeta, error
-        Damping ratio and its standard error.
-    height
-        Of its peak by itself, |A| / (2 zeta), (m/s2)/N.
-    """
-
-    blade: str
-    frequency: float
-    zeta: float
-    error: float
-    height: float
 
 
 def note_files(data: Mapping[str, Any]) -> None:
@@ -168,9 +144,9 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
 
 def fitted_modes(
     measured: Mapping[str, MeasuredChoice], data: Mapping[str, Any], table: str
-) -> tuple[FittedMode, ...]:
-    """Damping ratios of both blades' modes from the measured free curves, where the scene asks for
-    them.
+) -> tuple[tuple[FittedMode, ...], float]:
+    """Modes of both blades without damper from the measured free curves, where the scene asks for
+    them, and the damping ratio that stands for all: of the highest peak; none, and 0 else.
 
     Parameters
     ----------
@@ -188,8 +164,9 @@ def fitted_modes(
     """
     # damaged files are found with the other problems
     if data.get(table, {}).get("damping") != FROM_MEASURED or any(measured_problems(measured)):
-        return ()
+        return (), 0.0
     out: list[FittedMode] = []
+    heights: list[float] = []
     for name, one in measured.items():
         if one.state != "free":
             continue
@@ -198,17 +175,16 @@ def fitted_modes(
         except InputError as error:
             raise InputError(f"measured.{name}: {error}") from None
         out += [
-            FittedMode(one.blade, float(f), float(z), float(e), float(abs(A) / (2.0 * z)))
-            for f, z, e, A in zip(
-                fit.frequency, fit.zeta, fit.zeta_error, fit.constant, strict=True
-            )
+            (one.blade, float(f), float(z)) for f, z in zip(fit.frequency, fit.zeta, strict=True)
         ]
+        # of its peak by itself
+        heights += (np.abs(fit.constant) / (2.0 * fit.zeta)).tolist()
     if not out:
         raise InputError(
             f'{table}.damping: "{FROM_MEASURED}" needs a measured free curve; add a table '
             '[measured.NAME] with state = "free", or give a damping ratio'
         )
-    return tuple(out)
+    return tuple(out), out[int(np.argmax(heights))][2]
 
 
 @cache
@@ -221,43 +197,3 @@ def fit_of(choice: MeasuredChoice) -> DampingFit:
         As `upd.measured.fit_damping` does.
     """
     return fit_damping(choice.read())
-
-
-def modal_ratios(
-    fitted: tuple[FittedMode, ...], damping: float, frequency: Array, share: Array
-) -> Array:
-    """Damping ratios of modes of both blades without damper.
-
-    A mode takes the ratio of the fitted mode next to it in frequency (by ratio), of each blade by
-    the share of the modal mass that moves there; a blade that was not measured takes the other's.
-
-    Parameters
-    ----------
-    fitted
-        Of `fitted_modes`; without any all modes have ``damping``.
-    damping
-        The scene's.
-    frequency
-        (m,) Hz.
-    share
-        (m, 2) of the left and of the right blade in the modal mass.
-
-    Returns
-    -------
-    (m,) ndarray
-    """
-    if not fitted:
-        return np.full(len(frequency), damping)
-    f = np.maximum(frequency, np.finfo(float).tiny)
-    ratios = np.zeros_like(share)
-    for k, side in enumerate(("left", "right")):
-        mine = [one for one in fitted if one.blade == side] or list(fitted)
-        at = np.log([one.frequency for one in mine])
-        nearest = np.abs(np.log(f)[:, None] - at).argmin(axis=1)
-        ratios[:, k] = np.array([one.zeta for one in mine])[nearest]
-    return np.asarray((share * ratios).sum(axis=1) / share.sum(axis=1))
-
-
-def main_ratio(fitted: tuple[FittedMode, ...]) -> float:
-    """The ratio that stands for all: of the highest peak."""
-    return max(fitted, key=lambda one: one.height).zeta

@@ -9,13 +9,12 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import MeshChoice, RigBase, Table, repeated, rig_problems
+from upd.scene.base import MeshChoice, RigBase, repeated, rig_problems
 from upd.scene.measured import (
     FROM_MEASURED,
     UNTIL_READ,
     MeasuredChoice,
     fitted_modes,
-    main_ratio,
     measured_problems,
 )
 
@@ -25,7 +24,7 @@ ModalWant = Annotated[str, q.one_of(MODAL_WANTS), q.Example('"free"', '"glued"')
 
 
 @dataclass(frozen=True)
-class ModesChoice(Table):
+class ModesChoice:
     """Modes below a frequency, for one or both arrangements of the platforms.
 
     Attributes
@@ -43,7 +42,7 @@ class ModesChoice(Table):
 
 
 @dataclass(frozen=True)
-class ReductionChoice(Table):
+class ReductionChoice:
     """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
 
     Attributes
@@ -80,7 +79,7 @@ class ReductionChoice(Table):
 
 
 @dataclass(frozen=True)
-class ResponseChoice(Table):
+class ResponseChoice:
     """Linear frequency response between two frequencies.
 
     Attributes
@@ -132,10 +131,8 @@ class ModalScene(RigBase):
 
     def derived(self, data: Mapping[str, Any]) -> ModalScene:
         """With damping from measured curves."""
-        fitted = fitted_modes(self.measured, data, "response")
-        if not fitted:
-            return self
-        return replace(self, response=replace(self.response, damping=main_ratio(fitted)))
+        fitted, ratio = fitted_modes(self.measured, data, "response")
+        return replace(self, response=replace(self.response, damping=ratio)) if fitted else self
 
     def problems(self) -> Iterator[str]:
         """What does not fit together."""

@@ -9,6 +9,7 @@ import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, is_dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -136,11 +137,12 @@ def must(
 def one_of(names: Sequence[str]) -> AfterValidator:
     """A name that is none of ``names`` is a problem that lists them or names the nearest."""
     known = ", ".join(names)
-
-    def message(value: Any) -> str:
-        return f"is none of its values{did_you_mean(value, names, f'write one of {known}')}"
-
-    return must(lambda v: v in names, message, known)
+    others = f"write one of {known}"
+    return must(
+        lambda v: v in names,
+        lambda v: f"is none of its values{did_you_mean(v, names, others)}",
+        known,
+    )
 
 
 def is_whole(value: Any) -> bool:
@@ -303,9 +305,8 @@ def path_of(steps: Sequence[str | int]) -> str:
     return "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")
 
 
-def hints(cls: Any) -> dict[str, Any]:
-    """Annotations of a class's fields, by name."""
-    return typing.get_type_hints(cls, include_extras=True)
+#: annotations of a class's fields, by name
+hints = partial(typing.get_type_hints, include_extras=True)
 
 
 def must_be_given(f: Field[Any]) -> bool:

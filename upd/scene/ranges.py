@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from upd.errors import InputError, one_line
@@ -17,17 +17,20 @@ from upd.scene.read import load_scene
 from upd.units import parse_quantity, quantity_text, unit_inside
 
 
+@dataclass
 class InputProblems:
     """All that is wrong with several texts, raised at once.
 
-    Parameters
+    Attributes
     ----------
     heading
         Of what they are; without one they have headings of their own.
+    lines
+        A problem each.
     """
 
-    def __init__(self, heading: str = "") -> None:
-        self.heading, self.lines = heading, list[str]()
+    heading: str = ""
+    lines: list[str] = field(default_factory=list)
 
     @contextmanager
     def of(self, place: str = "") -> Iterator[None]:

@@ -31,7 +31,7 @@ from upd.scene.modal import ModalScene
 from upd.scene.quantities import Note, hint_at, hints, must_be_given, path_of, without_notes
 from upd.scene.seated import SEATED, SeatedScene
 from upd.scene.toml import plain, read_overrides, toml_value
-from upd.scene.uncertain import taken_out, uncertainties
+from upd.scene.uncertain import Band, taken_out, uncertainties
 from upd.units import parse_quantity
 
 AnyScene = Scene | ModalScene | ForcedScene | SeatedScene | BladedDiskScene
@@ -123,7 +123,8 @@ def _loaded(
     problems += _apply(data, pairs)
     _make_absolute(data, Path.cwd())
     note_files(data)
-    data, bands = taken_out(data)
+    bands: list[Band] = []
+    data = taken_out(data, bands)
     scene, more = _validate(data)
     problems += more
     if scene is not None and bands:
@@ -203,13 +204,11 @@ def _make_absolute(data: dict[str, Any], folder: Path) -> None:
     folder.
     """
 
-    def tables(name: str) -> list[Any]:
-        named = data.get(name)
-        return list(named.values()) if isinstance(named, dict) else []
-
     places: list[tuple[Any, str]] = [(data.get("geometry"), "recipe")]
-    places += [(table, key) for table in tables("stiffness") for key in ("scene", "run")]
-    places += [(table, "file") for table in tables("measured")]
+    for name, keys in (("stiffness", ("scene", "run")), ("measured", ("file",))):
+        named = data.get(name)
+        tables = named.values() if isinstance(named, dict) else ()
+        places += [(table, key) for table in tables for key in keys]
     for table, key in places:
         text = table.get(key) if isinstance(table, dict) else None
         if not isinstance(text, str) or (key == "recipe" and not is_file(text)):
@@ -251,7 +250,12 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
         scene = _adapter(kind).validate_python({**own, "text": tomli_w.dumps(_writable(data))})
     except ValidationError as error:
         known = {problem.partition(":")[0] for problem in problems}
-        found = [sentence(e, kind) for e in error.errors(include_url=False)]
+        # pydantic marks an error of a table's key by one more step
+        places = (
+            (e, tuple(step for step in e["loc"] if step != "[key]"))
+            for e in error.errors(include_url=False)
+        )
+        found = [f"{path_of(at) or 'scene'}: {_fault(e, at, kind)}" for e, at in places]
         problems += [problem for problem in found if problem.partition(":")[0] not in known]
     parameters: dict[str, Any] = {}
     geometry = data.get("geometry")
@@ -408,14 +412,8 @@ def never(value: Any) -> str:
 # -- what is wrong with a value and what to write instead, from pydantic's errors ------------------
 
 
-def sentence(error: Any, scene: type[Any]) -> str:
-    """One problem of a scene: its path in the file, what is wrong, and what to write instead."""
-    # pydantic marks an error of a table's key by one more step
-    location = tuple(step for step in error["loc"] if step != "[key]")
-    return f"{path_of(location) or 'scene'}: {_fault(error, location, scene)}"
-
-
 def _fault(error: Any, location: Sequence[Any], scene: type[Any]) -> str:
+    """What is wrong with one value of a scene, and what to write instead."""
     kind, value = error["type"], error["input"]
     if kind == "value_error":
         return str(error["msg"]).removeprefix("Value error, ")
@@ -430,9 +428,13 @@ def _fault(error: Any, location: Sequence[Any], scene: type[Any]) -> str:
     if kind == "too_long":
         return f"has {len(value)} values; write {example}"
     if kind == "literal_error":
-        return _other_choice(
-            value, Literal[FORCED, SEATED] if location == ("analysis",) else wanted
-        )
+        one_of: Any = Literal[FORCED, SEATED] if location == ("analysis",) else wanted
+        choices = [toml_value(choice) for choice in get_args(without_notes(one_of))]
+        if len(choices) == 1:
+            return f"{value!r} is not known; write {choices[0]}"
+        near = difflib.get_close_matches(toml_value(value), choices, 1)
+        meant = f", did you mean {near[0]}?" if near else ""
+        return f"{value!r} is none of its values{meant}; write one of {', '.join(choices)}"
     what = next((word for begin, word in _NOT.items() if kind.startswith(begin)), "")
     quotes = ", quotes included" if '"' in example and isinstance(value, str) else ""
     quotes = ", without quotes" if kind.startswith(("int", "float")) else quotes
@@ -451,15 +453,6 @@ def _addition(location: Sequence[Any], scene: type[Any]) -> str:
     if isinstance(location[-1], int):
         return f"; write {_example(hint_at(scene, location[:-1]))}"
     return f"; add for example {location[-1]} = {_example(hint_at(scene, location))}"
-
-
-def _other_choice(value: Any, wanted: Any) -> str:
-    choices = [toml_value(choice) for choice in get_args(without_notes(wanted))]
-    if len(choices) == 1:
-        return f"{value!r} is not known; write {choices[0]}"
-    near = difflib.get_close_matches(toml_value(value), choices, 1)
-    meant = f", did you mean {near[0]}?" if near else ""
-    return f"{value!r} is none of its values{meant}; write one of {', '.join(choices)}"
 
 
 def _keys(wanted: Any) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Any
 
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.scene.base import RigBase, Rotation
+from upd.scene.base import RigBase
 from upd.scene.quantities import FROM_SPEED
 
 
@@ -47,7 +47,7 @@ def with_damper(scene: Any, data: Mapping[str, Any], more: Sequence[str] = ()) -
     return replace(scene, damper=replace(damper, density=density, centrifugal=centrifugal))
 
 
-def rotation_problems(table: str, values: Rotation, given: Mapping[str, Any]) -> list[str]:
+def rotation_problems(table: str, values: Any, given: Mapping[str, Any]) -> list[str]:
     """What of radius, speed and centrifugal force does not go together."""
     radius, speed, direct = values.radius, values.speed, given.get("centrifugal")
     if (radius is None) != (speed is None):

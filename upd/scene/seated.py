@@ -11,7 +11,6 @@ from upd.scene.base import (
     DamperChoice,
     FaceFriction,
     RigBase,
-    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
@@ -32,7 +31,7 @@ whole_quarters = q.must(
 
 
 @dataclass(frozen=True)
-class BladesChoice(Table):
+class BladesChoice:
     """What of the blades is elastic.
 
     Attributes
@@ -46,7 +45,7 @@ class BladesChoice(Table):
 
 
 @dataclass(frozen=True)
-class SeatingChoice(Table):
+class SeatingChoice:
     """How F_C is raised, lowered and raised again, and other ways of loading for the band.
 
     Attributes
@@ -75,7 +74,7 @@ class SeatingChoice(Table):
 
 
 @dataclass(frozen=True)
-class MovedChoice(Table):
+class MovedChoice:
     """How the right blade is moved after the seating, F_C kept.
 
     Attributes

@@ -38,20 +38,15 @@ _BAND = re.compile(
 Band = tuple[Steps, Any, re.Match[str]]
 
 
-def taken_out(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Band]]:
-    """A scene's data with the values alone, and what stood after their +-.
+def taken_out(node: Any, found: list[Band], steps: Steps = ()) -> Any:
+    """A scene's data with the values alone; what stood after their +- is added to ``found``.
 
     Only what begins with a number is read so: a title may say +- too.
     """
-    found: list[Band] = []
-    return _without(data, (), found), found
-
-
-def _without(node: Any, steps: Steps, found: list[Band]) -> Any:
     if isinstance(node, Mapping):
-        return {key: _without(value, (*steps, str(key)), found) for key, value in node.items()}
+        return {key: taken_out(value, found, (*steps, str(key))) for key, value in node.items()}
     if isinstance(node, list):
-        return [_without(value, (*steps, k), found) for k, value in enumerate(node)]
+        return [taken_out(value, found, (*steps, k)) for k, value in enumerate(node)]
     match = _BAND.fullmatch(node) if isinstance(node, str) else None
     if match is None or len(steps) < 2:
         return node
@@ -154,7 +149,8 @@ def read_band(text: str, kind: str) -> tuple[float, float | None]:
         When it cannot be read.
     """
     # the first step stands for the table that every quantity of a scene has
-    data, bands = taken_out({"": {"": text}})
+    bands: list[Band] = []
+    data = taken_out({"": {"": text}}, bands)
     value = parse_quantity(data[""][""], kind)
     return value, _half_width(bands[0][2], kind, value) if bands else None
 

@@ -26,7 +26,8 @@ from upd.batch.table import csv_text, make_columns
 from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sweep_charts import sweep_charts
-from upd.report import sweep_page, write_comparison, write_report
+from upd.report import sweep_page, write_report
+from upd.report.run_page import write_comparison
 from upd.report.sweep_page import MOST_ROWS, grouped, read_sweep, sweep_sections, verdict
 from upd.results import Case, Result
 from upd.vary.outcome import Outcome

@@ -17,7 +17,7 @@ from rich.console import Console
 import upd
 from tests.pictures import no_figures
 from upd import cli
-from upd.cli.tables import print_result, print_table
+from upd.cli.tables import print_lines, print_table
 from upd.plot.answer_table import AnswerTable
 from upd.report.answer import LINES
 from upd.report.columns import folded_head, whole_table
@@ -97,7 +97,7 @@ def toy(
 def printed(result: RunResult, width: int, *, full: bool = False) -> list[str]:
     """The lines the terminal shows."""
     sheet = io.StringIO()
-    print_result(Console(file=sheet, width=width, highlight=False), result, full=full)
+    print_lines(Console(file=sheet, width=width, highlight=False), result.answer(width, full=full))
     return sheet.getvalue().splitlines()
 
 

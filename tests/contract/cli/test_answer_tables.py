@@ -11,7 +11,7 @@ from rich.console import Console
 
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.analyses.contact.analysis import ANALYSES
-from upd.cli.tables import print_result
+from upd.cli.tables import print_lines
 from upd.plot.answer_table import AnswerTable
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
@@ -66,7 +66,7 @@ def told(
 def printed(result: RunResult, width: int, *, full: bool = False) -> list[str]:
     """The lines the terminal shows."""
     sheet = io.StringIO()
-    print_result(Console(file=sheet, width=width, highlight=False), result, full=full)
+    print_lines(Console(file=sheet, width=width, highlight=False), result.answer(width, full=full))
     return sheet.getvalue().splitlines()
 
 

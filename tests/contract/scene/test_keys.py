@@ -25,12 +25,12 @@ from upd.scene import (
 from upd.scene.keys import (
     SceneKey,
     chosen_keys,
-    class_keys,
     entries,
     recipe_keys,
     scene_as_run,
     scene_keys,
     scene_to_start_from,
+    table_keys,
 )
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
 
@@ -53,7 +53,7 @@ def bare(key: SceneKey) -> bool:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_key_of_a_scene_is_explained(kind: type[object]) -> None:
-    keys = class_keys(kind)
+    keys = list(table_keys(kind))
     assert len(keys) > 20
     for key in keys:
         assert key.meaning.endswith("."), f"{key.path}: an entry under Attributes, please"

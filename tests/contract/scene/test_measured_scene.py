@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from upd.errors import InputError
 from upd.measured import MeasuredCurve, fit_damping
 from upd.scene import load_scene
 from upd.scene.keys import scene_as_run
-from upd.scene.measured import FittedMode, modal_ratios
 
 SCENE = """
 name = "lab"
@@ -48,9 +48,9 @@ def test_files_stand_relative_to_the_scene(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     loaded = load_scene(scene(tmp_path / "here"))
     assert loaded.measured["free"].file == str(path)
-    (mode,) = loaded.fitted
-    assert mode.zeta == loaded.excitation.damping == pytest.approx(0.004, rel=1e-5)
-    assert loaded.modal_damping(np.array([340.0]), np.ones((1, 2)))[0] == mode.zeta
+    ((_, _, zeta),) = loaded.fitted
+    assert zeta == loaded.excitation.damping == pytest.approx(0.004, rel=1e-5)
+    assert loaded.modal_damping(np.array([340.0]), np.ones((1, 2)))[0] == zeta
 
 
 def test_the_scene_as_run_reads_back_and_refuses_another_file(tmp_path: Path, monkeypatch) -> None:
@@ -65,7 +65,7 @@ def test_the_scene_as_run_reads_back_and_refuses_another_file(tmp_path: Path, mo
     curve(tmp_path, 0.006)
     with pytest.raises(InputError, match=f"{path} is not the file .* remove digest"):
         load_scene(written)
-    assert load_scene(scene(tmp_path)).fitted[0].zeta == pytest.approx(0.006, rel=1e-5)
+    assert load_scene(scene(tmp_path)).fitted[0][2] == pytest.approx(0.006, rel=1e-5)
 
 
 def test_points_of_sweeps_know_the_file_they_were_solved_with(tmp_path: Path) -> None:
@@ -108,23 +108,23 @@ def test_all_faults_at_once_with_line_and_column(tmp_path: Path) -> None:
 
 
 def test_every_mode_has_the_ratio_of_the_next_fitted_one_of_its_blade() -> None:
-    fitted = tuple(
-        FittedMode(*values, 0.0, 1.0)
-        for values in (("left", 300.0, 0.01), ("right", 340.0, 0.004), ("right", 900.0, 0.002))
-    )
+    fitted = ("left", 300.0, 0.01), ("right", 340.0, 0.004), ("right", 900.0, 0.002)
+    loaded = load_scene("symmetric-response", {"excitation.damping": 0.005})
     share = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5], [0.0, 1.0], [0.0, 1.0]])
-    found = modal_ratios(fitted, 0.005, np.array([900.0, 350.0, 340.0, 0.0, 5000.0]), share)
+    frequency = np.array([900.0, 350.0, 340.0, 0.0, 5000.0])
+    found = replace(loaded, fitted=fitted).modal_damping(frequency, share)
     assert found == pytest.approx([0.01, 0.004, 0.007, 0.004, 0.002])
-    assert modal_ratios((), 0.005, np.ones(2), np.ones((2, 2))).tolist() == [0.005, 0.005]
+    assert loaded.modal_damping(np.ones(2), np.ones((2, 2))).tolist() == [0.005, 0.005]
     # a blade that was not measured takes the other's
-    assert modal_ratios(fitted[1:], 0.005, np.array([340.0]), share[:1])[0] == 0.004
+    one = replace(loaded, fitted=fitted[1:]).modal_damping(np.array([340.0]), share[:1])
+    assert one[0] == 0.004
 
 
 def test_fit_is_that_of_the_library(tmp_path: Path) -> None:
     curve(tmp_path)
     mine = load_scene(scene(tmp_path)).measured["free"].read()
     assert isinstance(mine, MeasuredCurve)
-    assert fit_damping(mine).zeta[0] == load_scene(scene(tmp_path)).fitted[0].zeta
+    assert fit_damping(mine).zeta[0] == load_scene(scene(tmp_path)).fitted[0][2]
 
 
 def test_a_file_of_one_curve_says_what_it_is(tmp_path: Path) -> None:

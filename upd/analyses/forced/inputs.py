@@ -87,7 +87,7 @@ def _inputs(few: Run) -> Iterator[Variation]:
         label = f"T/N {part * mu:g} on both faces"
         yield Variation("static friction before vibration", label, static)
     for factor in _DAMPING:
-        fitted = tuple(replace(one, zeta=factor * one.zeta) for one in scene.fitted)
+        fitted = tuple((blade, f, factor * zeta) for blade, f, zeta in scene.fitted)
         damping = ("excitation.damping", factor * scene.excitation.damping), ("fitted", fitted)
         yield Variation("modal damping", f"x {factor:g}", damping)
 
