@@ -69,6 +69,13 @@ def test_closed_form_comes_first() -> None:
     assert only(points, "p", "coarse").reference == pytest.approx(2.9)
 
 
+def test_a_level_whose_number_is_zero_leaves_no_closed_form() -> None:
+    """The radius where one node touches is zero: its error does not tell what it should be."""
+    found = only(ladder("fine", {"a": [0.0, *power(3.0, 1.0)[1:]]}, 100, a=2.9), "a")
+    assert found.against == "finest level, no clear order"
+    assert np.isfinite(found.error).all()
+
+
 def test_a_ladder_that_scatters_says_so() -> None:
     found = only(ladder("fine", {"K": [3.1, 2.9, 3.05, 3.0]}, 100), "K")
     assert found.verdict.startswith("no clear order")

@@ -120,15 +120,15 @@ def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
     """Closed form of the number on every level, (n,), or None.
 
     That of a raw number is the half-space's plus the finite bodies' share, which is solved on the
-    level itself.
+    level itself. None too where a level has the number zero, and so none of it in its error.
     """
     quantity, _ = quantity_of(key[0])
     if not quantity.same_bodies:
-        if not all(key in p.errors for p in points):
+        if not all(p.errors.get(key, -1.0) > -1.0 for p in points):
             return None
         return np.array([p.values[key] / (1.0 + p.errors[key]) for p in points])
     contact = (quantity.full, key[1])
-    if not all(contact in p.errors for p in points):
+    if not all(p.errors.get(contact, -1.0) > -1.0 for p in points):
         return None
     return np.array(
         [
