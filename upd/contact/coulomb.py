@@ -13,9 +13,10 @@ and the slip made in the step. Per node
 Semismooth Newton with the stabilised Jacobian [1]_ finds it in a few steps from the state before or
 from full stick. Behind it friction rises from nothing, where the forces are those of a box problem
 and bodies that slide far are on their way already; then alternating directions on Coulomb's cone
-[2]_, from which Newton starts again. Vectors are laid out component by component: normal of all nodes, then one or two
-tangential directions. Where the pressing forces f_n are given, there are these alone; the problem
-is then convex, and a search for the motion stands behind Newton under a load.
+[2]_, from which Newton starts again. Vectors are laid out component by component: normal of all
+nodes, then one or two tangential directions. Where the pressing forces f_n are given, there are
+these alone; the problem is then convex, and a search for the motion stands behind
+Newton under a load.
 
 References
 ----------

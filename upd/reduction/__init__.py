@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from upd.linalg.common import Condensed
 from upd.reduction.component_modes import (
     AttachedModel,
     ErrorTarget,
@@ -16,7 +15,6 @@ from upd.reduction.reduced import ReducedModel
 
 __all__ = [
     "AttachedModel",
-    "Condensed",
     "ErrorTarget",
     "ReducedModel",
     "attachment_modes",
