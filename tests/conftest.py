@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -132,6 +133,9 @@ def _estimates_where_asked(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs, sweeps and studies without figures and pages, which take longer than small scenes."""
+    for taker in ("answer", "run_page", "sweep_page"):
+        # first imported now, it would keep the replaced function for all tests after this one
+        import_module(f"upd.report.{taker}")
     for name, written in {
         "upd.runner.write_figures": lambda *_: [],
         "upd.plot.matplotlib.write_sheets": lambda *_, **__: [],
