@@ -28,7 +28,7 @@ def public() -> list[type[Any]]:
 
 @pytest.mark.parametrize("kind", public(), ids=lambda kind: kind.__name__)
 def test_a_result_with_arrays_prints_them_as_shapes(kind: type[Any]) -> None:
-    arrays = [f.name for f in dataclasses.fields(kind) if "Array" in str(f.type)]
+    arrays = [f.name for f in dataclasses.fields(kind) if f.repr and "Array" in str(f.type)]
     assert not arrays or kind.__name__ == "FrequencyResponse" or issubclass(kind, Shown)
 
 

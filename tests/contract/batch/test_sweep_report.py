@@ -229,20 +229,22 @@ def test_two_parameters_with_numbers_give_a_map_and_curves(tmp_path: Path) -> No
 
 
 def test_words_are_ticks(tmp_path: Path) -> None:
-    made = read_sweep(_made(tmp_path / "words", {"e": ["a", "b"]}))
+    folder = _made(tmp_path / "words", {"e": ["a", "b"]})
+    made = read_sweep(folder)
     (chart,) = sweep_charts(made.axes, made.columns)
     assert chart.x.ticks == ((0, "a"), (1, "b")) and chart.traces[0].style == "points"
-    assert "page-data" in write_report(made.path).read_text("utf-8")
+    assert "page-data" in write_report(folder).read_text("utf-8")
 
 
 def test_more_parameters_give_a_curve_per_combination_of_the_others(tmp_path: Path) -> None:
-    made = read_sweep(_made(tmp_path / "many", {"a": [1, 2, 3], "b": [1, 2], "e": ["x", "y"]}))
+    folder = _made(tmp_path / "many", {"a": [1, 2, 3], "b": [1, 2], "e": ["x", "y"]})
+    made = read_sweep(folder)
     (chart,) = sweep_charts(made.axes, made.columns)
     assert chart.figure == "sweep" and not chart.maps
     assert [t.label for t in chart.traces] == ["b 1, e x", "b 1, e y", "b 2, e x", "b 2, e y"]
     np.testing.assert_array_equal(chart.traces[1].y, [1.0, 5.0, 9.0])
     np.testing.assert_array_equal(chart.traces[2].y, [2.0, 6.0, 10.0])
-    (page_chart,) = (c for one in sweep_sections(read_sweep(made.path)) for c in one.charts)
+    (page_chart,) = (c for one in sweep_sections(read_sweep(folder)) for c in one.charts)
     assert page_chart.heading == "Followed numbers over a and b and e"
 
 
@@ -270,9 +272,10 @@ def test_all_failed(tmp_path: Path) -> None:
 
 def test_parameters_of_one_last_word_have_titles_of_their_own(tmp_path: Path) -> None:
     axes = {"a.left.K_T": [1, 2], "a.right.K_T": [3, 4], "friction": [0.1, 0.2]}
-    made = read_sweep(_made(tmp_path / "s", axes))
+    folder = _made(tmp_path / "s", axes)
+    made = read_sweep(folder)
     assert [axis.short for axis in made.axes] == ["left K T", "right K T", "friction"]
-    html = write_report(made.path).read_text("utf-8")
+    html = write_report(folder).read_text("utf-8")
     head = html[html.index("<h2>Table") :].partition("</thead>")[0]
     assert "left K T" in head and "right K T" in head
 

@@ -49,11 +49,11 @@ class Harmonics:
     """
 
     numbers: tuple[int, ...]
-    static: bool = field(init=False, compare=False)
-    dynamic: NDArray[np.int64] = field(init=False, compare=False)
-    offset: int = field(init=False, compare=False)
-    size: int = field(init=False, compare=False)
-    highest: int = field(init=False, compare=False)
+    static: bool = field(init=False, compare=False, repr=False)
+    dynamic: NDArray[np.int64] = field(init=False, compare=False, repr=False)
+    offset: int = field(init=False, compare=False, repr=False)
+    size: int = field(init=False, compare=False, repr=False)
+    highest: int = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         static = self.numbers[0] == 0
