@@ -11,6 +11,7 @@ from typing import Any
 from upd import labels
 from upd.analyses import analysis_named
 from upd.analyses.base import Effect
+from upd.errors import InputError
 from upd.plot.answer_table import AnswerTable
 from upd.plot.chart import Chart, Entry
 from upd.results import Arrays, ErrorPart
@@ -290,6 +291,17 @@ def warnings(
 
 
 def analysis_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """The charts of a run that its analysis knows; none of an unknown one."""
+    """The charts of a run that its analysis knows; none of an unknown one.
+
+    Raises InputError where another version of upd wrote other arrays.
+    """
     analysis = analysis_named(str(summary["size"].get("analysis", "")))
-    return analysis.charts(arrays, summary) if analysis else []
+    if analysis is None:
+        return []
+    try:
+        return analysis.charts(arrays, summary)
+    except (IndexError, KeyError) as error:
+        raise InputError(
+            f"run of {summary['scene']}: its arrays are not those that this version of upd draws "
+            f"({error}); to fix it: run the scene in its folder again, upd run RUN/scene.toml"
+        ) from error

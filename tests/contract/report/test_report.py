@@ -10,6 +10,7 @@ import gzip
 import json
 import re
 import shutil
+from copy import deepcopy
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -188,6 +189,15 @@ def test_a_run_of_an_unknown_analysis_has_numbers_and_no_charts(hertz: RunFolder
     other = hertz.summary | {"size": {"analysis": "other"}}
     assert analysis_charts(hertz.arrays, other) == []
     assert main_numbers(other["size"], other["results"])[0]["reference"] is not None
+
+
+def test_arrays_of_another_version_are_refused(hertz: RunFolder) -> None:
+    other = deepcopy(dict(hertz.arrays))
+    for group in other.values():
+        if "traction" in group:
+            del group["traction"]
+    with pytest.raises(InputError, match="not those that this version of upd draws"):
+        analysis_charts(other, hertz.summary)
 
 
 # ---------------------------------------------------------------- charts against closed forms
