@@ -168,7 +168,8 @@ def test_sweep_killed_as_a_whole_takes_up_where_it_stood(
     folder = tmp_path / "killed"
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen(command(folder, "--workers", "2"), stdout=log, stderr=log)
-        wait_for(lambda: len(list(folder.glob("points/[!.]*.json"))) >= 2 or process.poll() is not None)
+        done = "points/[!.]*.json"
+        wait_for(lambda: len(list(folder.glob(done))) >= 2 or process.poll() is not None)
         workers = [
             int(pid)
             for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children")
@@ -177,7 +178,7 @@ def test_sweep_killed_as_a_whole_takes_up_where_it_stood(
         ]
         process.kill()
         process.wait()
-    stamps = {path: path.stat().st_mtime_ns for path in folder.glob("points/[!.]*.json")}
+    stamps = {path: path.stat().st_mtime_ns for path in folder.glob(done)}
     assert 2 <= len(stamps) < 6, "killed too late to show anything"
     assert not (folder / "table.csv").exists()
     # Nobody goes on computing for a sweep that is dead.
