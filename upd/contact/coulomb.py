@@ -15,8 +15,8 @@ from full stick. Behind it friction rises from nothing, where the forces are tho
 and bodies that slide far are on their way already; then alternating directions on Coulomb's cone
 [2]_, from which Newton starts again. Vectors are laid out component by component: normal of all
 nodes, then one or two tangential directions. Where the pressing forces f_n are given, there are
-these alone; the problem is then convex, and a search for the motion stands behind
-Newton under a load.
+these alone; the problem is then convex, and a search for the motion stands behind Newton under a
+load.
 
 References
 ----------
@@ -368,7 +368,7 @@ class Coulomb(CoulombConditions):
             else:
                 more *= 0.5
         self.mu = mu
-        return replace(self.judged(step, answer.at, used), iterations=used)
+        return self.judged(step, answer.at, used)
 
     def _frictionless(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
         """Without friction the forces are the one answer of a box QP, which is proven to end."""
