@@ -120,7 +120,7 @@ def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
     """Closed form of the number on every level, (n,), or None.
 
     That of a raw number is the half-space's plus the finite bodies' share, which is solved on the
-    level itself. None too where a level has the number zero, and so none of it in its error.
+    level itself. None too where the number is zero on a level: its error tells no closed form.
     """
     quantity, _ = quantity_of(key[0])
     if not quantity.same_bodies:
